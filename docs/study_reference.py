@@ -10,6 +10,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from palpate.learning import Settings, default, founding
+from palpate.record_complaints import unit_in
 from palpate.study import Study
 from palpate.study.body_records import (
     BodyRecord,
@@ -26,7 +27,6 @@ from palpate.study.material_records import (
     SolidMaterialRecord,
 )
 from palpate.study.part_records import PartSurfaceRecord
-from palpate.study.quantities import Unit
 from palpate.study.stage_records import SECTIONS, RuntimeRecord
 
 PAGE = Path(__file__).parent / "guide" / "study-file.md"
@@ -90,7 +90,7 @@ def _table(title: str, record: type[BaseModel], about: str) -> Iterator[str]:
     for name, field in record.model_fields.items():
         if _is_table(name, field.annotation):
             continue
-        unit = _unit((*field.metadata, field.annotation))
+        unit = unit_in((*field.metadata, field.annotation)) or ""
         start = "needed" if field.is_required() else _shown(field.get_default(call_default_factory=True))
         yield f"| `{name}` | {_kind(schema[name], unit)} | {start} | {field.description or ''} |"
     yield ""
@@ -107,15 +107,6 @@ def _has_record(annotation: Any) -> bool:
     """Whether an annotation names a record, however deep."""
     own = isinstance(annotation, type) and issubclass(annotation, BaseModel)
     return own or any(_has_record(part) for part in get_args(annotation))
-
-
-def _unit(parts: Any) -> str:
-    for part in parts:
-        if isinstance(part, Unit):
-            return part.name
-        if found := _unit((*get_args(part), *getattr(part, "__metadata__", ()))):
-            return found
-    return ""
 
 
 def _kind(schema: dict[str, Any], unit: str) -> str:

@@ -8,7 +8,7 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.tables.unit_names import si_unit
-from palpate.units import si_conversion, to_base_si, to_si
+from palpate.unit_text import si_conversion
 
 TURN = 2 * math.pi
 
@@ -48,23 +48,6 @@ def test_units_become_si(unit, expected):
 @pytest.mark.parametrize(("unit", "name"), [("N m", "N m"), ("N·mm", "N m"), ("J", "J"), ("1/s", "1/s")])
 def test_the_head_of_a_table_keeps_moments_apart_from_energies(unit, name):
     assert si_unit(unit)[2] == name
-
-
-@pytest.mark.parametrize(
-    "text", ["5 N/0", "5 (kPa", "}", "10 Pa**1e9**1e9", '"^', "5 furlongs_", "", "m ²", "degC 1j", "(" * 3000]
-)
-def test_what_is_no_quantity_is_refused(text):
-    with pytest.raises(UsageError, match="is not a quantity in Pa"):
-        to_si(text, "Pa")
-    with pytest.raises(UsageError, match="is no number and no quantity"):
-        to_base_si(text)
-
-
-def test_a_quantity_of_any_dimension_becomes_si():
-    assert to_base_si("2 kPa") == to_si("2 kPa", "Pa") == 2000.0
-    assert to_base_si("0.12 mm") == 0.00012
-    assert to_base_si(" 0.3 ") == 0.3
-    assert to_base_si("50 %") == 0.5
 
 
 def test_what_is_no_unit_is_refused():

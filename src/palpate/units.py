@@ -1,35 +1,26 @@
 """Names, SI units and ranges of the quantities that travel between palpate's parts.
 
 Everything inside palpate is in SI units: m, N, Pa, kg/m³, s, rad. Other units exist only at the door: a study
-file may say ``"110 GPa"``, and `to_si` turns it into 1.1e11.
+file may say ``"110 GPa"``, and `parse_quantity` turns it into 1.1e11.
 """
 
 from __future__ import annotations
 
-import functools
+import contextlib
 import math
-import re
-import tokenize
+import numbers
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.number_text import leading_number
+from palpate.unit_text import conversion_to, usual_unit
 
-__all__ = ["Quantity", "Range", "bounds", "registry", "si_conversion", "to_base_si", "to_si"]
-
-# units in which quantities are stated, by what they measure; the first that fits is taken
-_STATED: tuple[str, ...] = ("m", "m/s", "m/s²", "N", "N/m", "Pa", "J", "s", "Hz", "kg", "kg/m³", "m²", "m³")
-_STATED += ("K", "rad", "rad/s", "W", "V", "A", "Pa s", "mol")
-_ANGLE = re.compile(r"\b(rad|deg(?!C|F|_)|rpm|rev|turn|cycle)", re.IGNORECASE)
-_SPELT = str.maketrans(
-    {"µ": "u", "μ": "u", "·": "*", "⋅": "*", "²": "**2", "³": "**3", "^": "**", "°": "deg", "%": "percent"}
-)
-
-_DIGITS = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
+__all__ = ["Quantity", "Range", "bounds", "parse_quantity"]
 
 
 @dataclass(frozen=True)
@@ -88,149 +79,87 @@ class Range:
         return f"{self.name} {self.low + 0.0:g} … {self.high:g} {self.unit}".rstrip()
 
 
-def _rounded_once(text: str, quantity: Any, unit: Any) -> float:
-    """Return a quantity in a unit; its digits are rounded once where one unit is a whole number of the other.
-
-    So "0.12 mm" is 0.00012 to the last bit, and not a rounded number times a rounded thousandth.
-    """
-    value = float(quantity.to(unit).magnitude)
-    digits = _DIGITS.match(text)
-    if not value or digits is None:
-        return value
-    share = float(registry().Quantity(1.0, unit).to(quantity.units).magnitude)
-    factor = Fraction(1, round(share)) if share >= 1 else Fraction(round(1 / share)) if share > 0 else 0
-    exact = float(Fraction(digits.group()) * factor)
-    return exact if math.isclose(exact, value, rel_tol=1e-14) else value
-
-
 def bounds(ranges: Sequence[Range]) -> tuple[np.ndarray, np.ndarray]:
     """Return the lower and the upper ends of n ranges, each of shape (n,)."""
     return np.array([r.low for r in ranges]), np.array([r.high for r in ranges])
 
 
-@functools.cache
-def registry() -> Any:
-    """Return the one registry of units of Pint."""
-    import pint  # costs about 0.3 s: only those who parse units pay
+def parse_quantity(value: str | float, unit: str | None, name: str = "", *, bare: bool = False) -> float:
+    """Return a quantity that a person has written, such as ``"110 GPa"`` or ``"10,5kPa"``, in an SI unit.
 
-    return pint.UnitRegistry()
-
-
-@functools.cache
-def si_conversion(unit: str) -> tuple[float, float, str]:
-    """Return factor, offset and SI unit: a value v in `unit` is factor · v + offset in the SI unit.
-
-    Parameters
-    ----------
-    unit : str
-        For example ``"mm"``, ``"N/mm²"`` or ``"°C"``; "" and "1" are pure numbers, whose SI unit is "".
-
-    Raises
-    ------
-    UsageError
-        If there is no such unit.
-    """
-    if unit.strip() in {"", "1"}:
-        return 1.0, 0.0, ""
-    import pint
-
-    text = re.sub(r"\b(rev|cycles)\b", "turn", unit.translate(_SPELT))
-    try:
-        zero, one = (registry().Quantity(value, text).to_base_units() for value in (0.0, 1.0))
-    except _no_quantity(pint) as error:
-        raise UsageError(
-            f"{unit!r} is no unit that is known.",
-            why=f"{error}.",
-            fix="Write it as mm, N, kPa, N/mm^2, 1/s, or 1 for a pure number.",
-        ) from error
-    factor, offset = float(one.magnitude - zero.magnitude), float(zero.magnitude)
-    angular = bool(_ANGLE.search(text))
-    for name in _STATED:
-        if ("rad" in name) == angular and _stated(name).dimensionality == one.dimensionality:
-            return factor, offset, name
-    if one.dimensionless:
-        return factor, offset, ""
-    return factor, offset, unit if (factor, offset) == (1.0, 0.0) else f"{one.units:~C}".replace("**", "^")
-
-
-def _stated(name: str) -> Any:
-    return registry().Unit(name.translate(_SPELT).replace(" ", "*"))
-
-
-def _no_quantity(pint: Any) -> tuple[type[Exception], ...]:
-    """Return what Pint raises of a text that is no quantity.
-
-    It reads texts as Python does and computes what they say: brackets that nobody closes are a `TokenError`, 1/0 an
-    `ArithmeticError`, a thousand brackets a `RecursionError`.
-    """
-    read = (ValueError, TypeError, AttributeError, AssertionError, SyntaxError, tokenize.TokenError)
-    return (pint.errors.PintError, *read, ArithmeticError, RecursionError)
-
-
-def to_base_si(value: str) -> float:
-    """Convert a quantity of any dimension, such as ``"110 GPa"``, to a number in SI base units.
-
-    Parameters
-    ----------
-    value : str
-        Text with a number and a unit; a number alone is a pure number.
-
-    Raises
-    ------
-    UsageError
-        If the text is no quantity.
-    """
-    import pint
-
-    try:
-        quantity = registry().Quantity(value)
-        return _rounded_once(value.strip(), quantity, quantity.to_base_units().units)
-    except _no_quantity(pint) as error:
-        raise UsageError(
-            f"{value!r} is no number and no quantity with a unit.",
-            why=f"{error}.",
-            fix='Write a number, or a quantity such as "110 GPa".',
-        ) from error
-
-
-def to_si(value: str | float, unit: str) -> float:
-    """Convert a quantity such as ``"110 GPa"`` to a number in `unit`.
+    Every text that means a quantity comes through here: a number, and then its unit. A decimal comma and marks between
+    thousands are understood where they allow one reading, as in tables. So is a unit in the wrong case, such as that
+    of ``"10 kpa"``.
 
     Parameters
     ----------
     value : str or float
-        Text with a number and a unit; a number alone is taken to be in `unit` already.
-    unit : str
-        The SI unit wanted, for example ``"Pa"``.
+        Text with a number and a unit; a number, which is no text, is taken to be in `unit` already.
+    unit : str or None
+        The SI unit wanted, for example ``"Pa"``; "" for a pure number, which a text may give in %, too. None: a
+        quantity of any dimension, in SI base units.
+    name : str
+        What the quantity is, for messages, such as ``"--young"``.
+    bare : bool
+        True where a text without a unit, too, is a number in `unit`, as behind options whose help names the unit.
 
     Returns
     -------
     float
-        The value in `unit`.
+        The value in `unit`; digits are rounded once.
 
     Raises
     ------
     UsageError
-        If the text is no quantity, or of another dimension than `unit`.
+        If the value is neither a finite number nor a text that says one, has no unit or one of another dimension, or if
+        a comma or the case of the unit allows two readings.
     """
-    if not isinstance(value, str):
-        return float(value)
-    import pint
-
     try:
-        quantity = registry().Quantity(value)
-        if unit and quantity.unitless:
-            raise UsageError(
-                f"{value!r} has no unit.",
-                why=f"As text a quantity needs one; as a number, without quotes, it is in {unit}.",
-                fix=f'Write "{value.strip()} {unit}", or the number without quotes.',
-            )
-        return _rounded_once(value.strip(), quantity, unit or "dimensionless")
-    except _no_quantity(pint) as error:
+        if not isinstance(value, str):
+            return _finite(value, unit or "")
+        number = leading_number(value)
+        factor, offset = _conversion(number.rest, unit if number.rest or not bare else "", value.strip())
+        return _as_float(number.value * factor + offset, value.strip())
+    except UsageError as error:
+        what = f"{name}: {error.what}" if name else error.what
+        raise UsageError(what, why=error.why, fix=error.fix) from error
+
+
+def _as_float(value: Fraction, text: str) -> float:
+    if value and not sys.float_info.min <= abs(value) <= sys.float_info.max:
         raise UsageError(
-            f"{value!r} is not a quantity in {unit or 'pure numbers'}.",
-            why=f"{error}.",
-            fix=f'Write a number in {unit}, or a quantity such as "1 {unit}".'
-            if unit
-            else "Write a number alone.",
+            f"{text!r} is beyond what a number in SI units can hold.", fix="Correct number and unit."
+        )
+    return float(value)
+
+
+def _finite(value: object, unit: str) -> float:
+    if not isinstance(value, bool) and isinstance(value, numbers.Real):
+        with contextlib.suppress(OverflowError):  # of a whole number with 400 digits
+            if math.isfinite(number := float(value)):
+                return number
+    raise UsageError(
+        f"{value!r} is no finite number{f' in {unit}' if unit else ''}.",
+        fix=f'Write a number, or a text with its unit, such as "10 {usual_unit(unit)}".' if unit else "",
+    )
+
+
+def _conversion(text: str, unit: str | None, whole: str) -> tuple[Fraction, Fraction]:
+    """Return factor and offset from the unit of a text, of which `whole` is all, to the SI unit wanted."""
+    if not text and unit:
+        raise UsageError(
+            f"{whole!r} has no unit.",
+            fix=f'Write it with its unit, for example "{whole} {usual_unit(unit)}".',
+        )
+    if text in {"", "%"} and not unit:  # needs no registry of units, which costs a good half second
+        return Fraction(1, 100 if text else 1), Fraction(0)
+    try:
+        return conversion_to(text, unit)
+    except UsageError as error:
+        wanted = (
+            f"a quantity in {unit}" if unit else "a number or a quantity" if unit is None else "a pure number"
+        )
+        fix = f'Write for example "10 {usual_unit(unit)}".' if unit else "Write a number alone, such as 0.5."
+        raise UsageError(
+            f"{whole!r} is not {wanted}.", why=f"{error.what} {error.why}".strip(), fix=error.fix or fix
         ) from error

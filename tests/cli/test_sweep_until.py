@@ -57,7 +57,8 @@ def test_solves_are_chosen_until_the_error_is_kept(palpate, study, tmp_path):
 @pytest.mark.parametrize(
     ("options", "answer"),
     [
-        (("--until", "two"), "no force error"),
+        (("--until", "two"), "'two' is no number"),
+        (("--until", "2"), "no force error"),
         (("--until", "200%"), "no force error"),
         (("--minutes", "3"), "Give --until"),
     ],

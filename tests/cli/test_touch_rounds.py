@@ -57,3 +57,44 @@ def test_a_choice_that_does_not_suit_is_no_missed_target(palpate, asked, tmp_pat
     assert answer.code == 2
     assert "poisson" in answer.err
     assert not asked
+
+
+def test_quantities_behind_options_are_read_as_they_are_written(palpate, asked, tmp_path):
+    part = box(tmp_path / "pad.stl")
+    assert (
+        palpate("touch", part, "--young", "10,5kPa", "--depth", "3,5mm", "--poisson", "0,4", "--no-view").code
+        == 1
+    )
+    study = asked[0]
+    assert study.body.material.young == 10500.0
+    assert study.body.material.poisson == 0.4
+    assert study.interaction.depth[1] == 0.0035
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--young", "10"), "--young: '10' has no unit.\nWrite it with its unit, for example \"10 kPa\"."),
+        (("--young", "10 MPA"), "may mean"),
+        (("--depth", "1,000 mm"), "1,000 may be 1.000 or 1000"),
+        (("--radius", "∞ m"), "infinity"),
+        (
+            ("--poisson", "0.7"),
+            "0.7 is out of range; allowed is at least 0 and less than 0.5; for example 0.45",
+        ),
+        (("--poisson", "nan"), "--poisson: 'nan' is no number"),
+        (("--poisson", "0.4x"), "--poisson: '0.4x' is not a pure number"),
+        (("--minutes", "-1"), "--minutes: -1 is out of range"),
+        (("--workers", "1_0"), "--workers: '1_0' is no whole number"),
+        (("--workers", "1,5"), "--workers: '1,5' is no whole number"),
+        (("--port", "99999"), "--port: 99999 is out of range"),
+        (("--until", "2"), "no force error"),
+        (("--until", "2,5 %%"), "--until:"),
+    ],
+)
+def test_what_is_no_such_quantity_is_asked_for(palpate, asked, tmp_path, options, words):
+    answer = palpate("touch", box(tmp_path / "pad.stl"), *options, "--no-view")
+    assert answer.code == 2
+    assert words in answer.err
+    assert "Input should" not in answer.err
+    assert not asked

@@ -248,7 +248,10 @@ def test_a_study_for_a_part_says_what_its_file_holds(folder):
 @pytest.mark.parametrize(
     ("choice", "words"),
     [
-        ({"poisson": 0.7}, "body.material.poisson: Input should be less than 0.5"),
+        (
+            {"poisson": 0.7},
+            "body.material.poisson: 0.7 is out of range; allowed is at least 0 and less than 0.5",
+        ),
         ({"touched": "front"}, "has no surface 'front'"),
         ({"radius": -1e-3}, "The radius of the ball"),
         ({"depth": 0.0}, "The depth of the ball"),

@@ -13,10 +13,12 @@ from chromium_page import READ, assert_no, hold_again, vector
 from playwright.sync_api import Browser, Page
 from slabs import DEVIATION, touched_slab
 
+from palpate.errors import UsageError
 from palpate.study import Study
 from palpate.study.part_choices import chosen_study, shown_part
 from palpate.study.part_study import part_study
 from palpate.surrogates import Surrogate
+from palpate.units import parse_quantity
 from palpate.viewer.part_page import PartPage, Progress, serve_part
 from palpate.viewer.shown_part import PartChoices, ShownPart
 
@@ -91,7 +93,7 @@ def test_a_part_is_set_up_by_picks_and_texts(server, page, study, chosen, keep):
     page.wait_for_selector("html[data-partdrawn][data-picked]")
 
     begin(page, young="4")
-    assert "without a unit" in problem(page)
+    assert "Young's modulus: '4' has no unit" in problem(page)
     begin(page, young="4 kPa", ball_depth="25 mm")
     assert "The depth of 25 mm is more than the part is thick, 20 mm." in problem(page)
     begin(page, ball_depth="2 mm", poisson="0.6")
@@ -216,3 +218,26 @@ def pressed(page: Page) -> dict:
             return now
         was = now
     pytest.fail(f"the page did not settle: {was}")
+
+
+LENGTHS = """
+6 mm|6mm|0,5 mm|10,5mm|1 000 mm|1.000,5 mm|1,000.5 mm|1,000 mm|1.000 mm|1'000 mm|−5 mm|1e-3 m|1E3 um|2,5e3 µm|5 μm|
+2.50 × 10⁻⁸ m|.5 cm|5. cm|5,|5 MM|5 Mm|5 CM|5 M|1 in|1_000 mm|0x10 mm|½ mm|５ mm|∞ m|nan m|1 00 mm|5||mm|5 mm 3|5 kPa|
+1e400 m|–5 mm
+""".replace("\n", "").split("|")
+
+
+def test_the_page_draws_the_lengths_that_the_server_reads(server, page, study):
+    def read(text: str) -> float:
+        try:
+            return parse_quantity(text, "m")
+        except UsageError:
+            return 0.0  # nothing is drawn
+
+    page.wait_for_selector("html[data-stage=reading]")
+    server.show_part(shown_part(study))
+    page.wait_for_selector("html[data-partdrawn][data-picked]")
+    for text in LENGTHS:
+        page.fill("#ball-radius", text)
+        drawn = float(page.get_attribute("#ball-radius", "data-metres"))
+        assert drawn == pytest.approx(read(text), rel=1e-12), text

@@ -17,6 +17,7 @@ from palpate.cli.device_commands import devices_app
 from palpate.cli.exchange_commands import card, export_dataset
 from palpate.cli.export_commands import export_app
 from palpate.cli.material_commands import material_app
+from palpate.cli.number_options import count_option, number_option
 from palpate.cli.sweep_command import sweep
 from palpate.cli.table_commands import correct, fit
 from palpate.cli.table_options import Json, with_table_options
@@ -50,20 +51,23 @@ ModelFile = Annotated[
     Path, typer.Argument(help="Model file (.palpate), as [bold]palpate learn[/] writes it.")
 ]
 Workers = Annotated[
-    int | None, typer.Option(min=1, help="Number of worker processes. Default: one per core.")
+    int | None, count_option("--workers", least=1, help="Number of worker processes. Default: one per core.")
 ]
 CaseLimit = Annotated[
     float,
-    typer.Option(
-        min=0.1,
+    number_option(
+        "--case-limit",
+        "s",
+        least=0.1,
         help="Seconds after which a single solve has failed. It costs that solve; the sweep goes on.",
     ),
 ]
 Port = Annotated[
     int | None,
-    typer.Option(
-        min=0,
-        max=65535,
+    count_option(
+        "--port",
+        least=0,
+        most=65535,
         help="Port of the page. Default: that of the study. If it is busy, the next free port is used.",
     ),
 ]
@@ -173,7 +177,8 @@ app.command()(sweep)
 def learn(
     study: Annotated[Path, typer.Argument(help="Study file, or a dataset (NAME.zarr).")] = STUDY,
     effort: Annotated[
-        float | None, typer.Option(min=0.01, help="Of a dataset: how much is tried; 0.1 is a quick look.")
+        float | None,
+        number_option("--effort", least=0.01, help="Of a dataset: how much is tried; 0.1 is a quick look."),
     ] = None,
     watch: Annotated[
         bool,
@@ -267,7 +272,7 @@ def view(
 @app.command()
 def show(
     file: Annotated[Path, typer.Argument(help="File (.vtu or .pvd) or dataset (.zarr) with solved bodies.")],
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page.")] = 8080,
+    port: Annotated[int, count_option("--port", least=0, most=65535, help="Port of the page.")] = 8080,
     strict_port: Annotated[
         bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")
     ] = False,
@@ -319,11 +324,13 @@ def ask(
 @app.command()
 def run(
     model: ModelFile,
-    seconds: Annotated[float, typer.Option(min=0.1, help="Duration in seconds.")] = 5.0,
+    seconds: Annotated[float, number_option("--seconds", "s", least=0.1, help="Duration in seconds.")] = 5.0,
     device: Device = "stroke",
     rate: Annotated[
         float | None,
-        typer.Option(min=10, max=10000, help="Ticks per second (Hz). Default: that of the study."),
+        number_option(
+            "--rate", "Hz", least=10, most=10000, help="Ticks per second (Hz). Default: that of the study."
+        ),
     ] = None,
     unsoftened: Unsoftened = False,
     no_controller: NoController = False,
@@ -384,7 +391,8 @@ def import_dataset(
         Path | None, typer.Option(help="Dataset to write. Default: the first file's name with .zarr.")
     ] = None,
     test: Annotated[
-        float, typer.Option(min=0, max=0.9, help="Share of the cases for a test set, NAME-test.zarr.")
+        float,
+        number_option("--test", least=0, most=0.9, help="Share of the cases for a test set, NAME-test.zarr."),
     ] = 0.0,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print what the files hold and what would be written.")
@@ -402,7 +410,14 @@ def import_dataset(
 @app.command()
 def doctor(
     seconds: Annotated[
-        float, typer.Option(min=0, max=3600, help="Duration of the timing test in seconds; 0 leaves it out.")
+        float,
+        number_option(
+            "--seconds",
+            "s",
+            least=0,
+            most=3600,
+            help="Duration of the timing test in seconds; 0 leaves it out.",
+        ),
     ] = 10.0,
     as_json: Json = False,
 ) -> None:

@@ -17,11 +17,12 @@ from palpate.learning import Fitted
 from palpate.learning.loading import load
 from palpate.learning.plastic.load_histories import LoadHistories
 from palpate.network import Network
+from palpate.number_text import number_list
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import LearntEnergy, Surrogate
 from palpate.surrogates.fields.node_field import NodeField
 from palpate.surrogates.surrogate import correction_warning
-from palpate.units import Range
+from palpate.units import Range, parse_quantity
 
 __all__ = ["answers_at", "ask", "deflections", "inputs_of"]
 
@@ -155,17 +156,20 @@ def _places(texts: Sequence[str], inputs: Sequence[Range]) -> np.ndarray:
 
 
 def _place(text: str, inputs: Sequence[Range]) -> list[float]:
-    """Return numbers with commas or blanks between them, as many as there are inputs."""
-    try:
-        values = [float(word) for word in text.replace(",", " ").split()]
-    except ValueError:
-        values = []
-    if len(values) != len(inputs) or not all(map(math.isfinite, values)):
-        names = ", ".join(f"{r.name} ({r.unit})" if r.unit else r.name for r in inputs)
-        example = ",".join(f"{(r.low + r.high) / 2:.4g}" for r in inputs)
-        raise UsageError(
-            f"{text!r} is no place of this model.",
-            why=f"It has {count(len(inputs), 'input')}: {names}.",
-            fix=f"Give {count(len(inputs), 'number')}, for example --at {example}; commas stand between several.",
-        )
-    return values
+    """Return numbers with commas or blanks between them, as many as there are inputs; units may stand with them."""
+    words = number_list(text)
+    problem = f"The text says {count(len(words), 'number')}."
+    if len(words) == len(inputs):
+        try:
+            return [
+                parse_quantity(word, r.unit, r.name, bare=True) for word, r in zip(words, inputs, strict=True)
+            ]
+        except UsageError as error:
+            problem = " ".join(str(error).split("\n"))
+    names = ", ".join(f"{r.name} ({r.unit})" if r.unit else r.name for r in inputs)
+    example = ",".join(f"{(r.low + r.high) / 2:.4g}" for r in inputs)
+    raise UsageError(
+        f"{text!r} is no place of this model.",
+        why=f"It has {count(len(inputs), 'input')}: {names}. {problem}",
+        fix=f"Give {count(len(inputs), 'number')}, for example --at {example}; commas stand between several.",
+    )

@@ -23,7 +23,7 @@ from palpate.learning.correction import (
     summarise_correction,
 )
 from palpate.surrogates import Surrogate
-from palpate.units import to_si
+from palpate.units import parse_quantity
 
 __all__ = ["Source", "correct_model"]
 
@@ -182,7 +182,9 @@ def _parameters(surrogate: Surrogate, words: Sequence[str]) -> list[float]:
             why="A specimen is one member of the family that the model is of.",
             fix="Give each of them once: --parameter NAME=VALUE." if names else "Leave --parameter out.",
         )
-    values = [_value(said[r.name], r.unit) for r in surrogate.parameters]
+    values = [
+        parse_quantity(said[r.name], r.unit, f"--parameter {r.name}", bare=True) for r in surrogate.parameters
+    ]
     for r, value in zip(surrogate.parameters, values, strict=True):
         if not r.low <= value <= r.high:
             raise UsageError(
@@ -193,10 +195,3 @@ def _parameters(surrogate: Surrogate, words: Sequence[str]) -> list[float]:
                 fix="Give a value within them, in SI units or with a unit: fat.young=4kPa.",
             )
     return values
-
-
-def _value(text: str, unit: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return to_si(text, unit)

@@ -8,9 +8,10 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.format import share
+from palpate.number_text import number_list
 from palpate.runtime.touchable import Touchable, touchable
 from palpate.surrogates import Surrogate, TouchedSurface
-from palpate.units import bounds
+from palpate.units import bounds, parse_quantity
 
 __all__ = ["reservations_about", "stroke_of"]
 
@@ -136,10 +137,9 @@ def reservations_about(body: Surrogate, X: np.ndarray) -> list[str]:
 
 
 def _numbers(text: str) -> np.ndarray:
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError as error:
-        raise UsageError(f"{text!r} is no place.", fix="Write x,y,z in m, such as 0.05,0.05,0.05.") from error
-    if len(values) != 3 or not np.isfinite(values).all():
-        raise UsageError(f"{text!r} is no place of three numbers.", fix="Write x,y,z in m.")
-    return values
+    words = number_list(text)
+    if len(words) != 3:
+        raise UsageError(
+            f"{text!r} is no place of three numbers.", fix="Write x,y,z in m, such as 0.05,0.05,0.05."
+        )
+    return np.array([parse_quantity(word, "m", "--at", bare=True) for word in words])

@@ -9,13 +9,17 @@ import typer
 
 from palpate.cli.console import Console
 from palpate.cli.export_commands import export_app
+from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
+from palpate.number_text import whole_number
 from palpate.output_files import require_outputs
 
 __all__ = ["card", "export_dataset"]
 
-Steps = Annotated[int, typer.Option(min=1, help="States of the stroke, from first contact to the deepest.")]
+Steps = Annotated[
+    int, count_option("--steps", least=1, help="States of the stroke, from first contact to the deepest.")
+]
 Place = Annotated[
     str | None,
     typer.Option(
@@ -25,8 +29,11 @@ Place = Annotated[
 ]
 Depth = Annotated[
     float | None,
-    typer.Option(
-        min=0, help="Largest depth of the probe in the surface, m. Default: the deepest trained one."
+    number_option(
+        "--depth",
+        "m",
+        least=0,
+        help="Largest depth of the probe in the surface, m. Default: the deepest trained one.",
     ),
 ]
 
@@ -92,7 +99,9 @@ def export_dataset(
     fields: Annotated[
         bool, typer.Option("--fields", help="For .csv: also the fields at the nodes, to NAME-fields.csv.")
     ] = False,
-    targets: Annotated[int, typer.Option(min=1, help="For .glb: most states of the body.")] = 8,
+    targets: Annotated[
+        int, count_option("--targets", least=1, help="For .glb: most states of the body.")
+    ] = 8,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -138,9 +147,9 @@ def _rows(text: str | None, count: int) -> list[int] | None:
     found: list[int] = []
     try:
         for part in text.split(","):
-            ends = [int(end) if end.strip() else None for end in part.split(":")]
+            ends = [whole_number(end) if end.strip() else None for end in part.split(":")]
             found += [ends[0] or 0] if len(ends) == 1 else list(range(*slice(*ends).indices(count)))
-    except (ValueError, TypeError) as error:
+    except (UsageError, ValueError, TypeError) as error:
         raise UsageError(f"{text!r} are no rows.", fix="Write 0,4,8 or 0:10 or 0:100:5.") from error
     return found
 

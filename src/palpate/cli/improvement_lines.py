@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.errors import AccuracyError, UsageError
 from palpate.format import count, duration, share
+from palpate.units import parse_quantity
 
 if TYPE_CHECKING:
     from palpate.cli.console import Console
@@ -161,10 +162,7 @@ def share_of(text: str) -> float:
     UsageError
         If the text is no share between 0 and 1.
     """
-    try:
-        value = float(text.strip().removesuffix("%")) / (100 if "%" in text else 1)
-    except ValueError:
-        value = 0.0
+    value = parse_quantity(text, "", "--until")
     if 0 < value < 1:
         return value
-    raise UsageError(f"{text!r} is no force error.", fix="Give a share such as 2% or 0.02.")
+    raise UsageError(f"--until: {text!r} is no force error.", fix="Give a share such as 2% or 0.02.")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from palpate.cli.console import Console
+from palpate.cli.number_options import number_option
 from palpate.cli.table_options import Json, with_table_options
 from palpate.errors import UsageError
 
@@ -73,7 +74,7 @@ def fit(
         ),
     ] = None,
     poisson: Annotated[
-        float | None, typer.Option(help="Poisson's ratio. Default: 0.5, of indentation 0.45.")
+        float | None, number_option("--poisson", help="Poisson's ratio. Default: 0.5, of indentation 0.45.")
     ] = None,
     weight: Annotated[
         str,
@@ -82,7 +83,8 @@ def fit(
         ),
     ] = "peak",
     margin: Annotated[
-        float, typer.Option(min=0, help="How much farther than the data the law must be stable.")
+        float,
+        number_option("--margin", least=0, help="How much farther than the data the law must be stable."),
     ] = 0.1,
     radius: Annotated[
         str | None, typer.Option(help='For indentation: radius of the ball, such as "5 mm".')
@@ -284,7 +286,7 @@ def fit_material(
 
 def _fit_relaxation(tables: SpecimenTables, options: dict[str, Any]) -> Any:
     from palpate.physics.materials import fit_relaxation
-    from palpate.units import to_si
+    from palpate.units import parse_quantity
 
     if len(tables.files) > 1:
         raise UsageError(
@@ -293,16 +295,18 @@ def _fit_relaxation(tables: SpecimenTables, options: dict[str, Any]) -> Any:
             fix="Fit the other files by a command of their own.",
         )
     time, response = tables.pair(0, "time", "s", "stress", "force", "nominal", "true")
-    return fit_relaxation(time, response, ramp=to_si(options["ramp"], "s"))
+    return fit_relaxation(time, response, ramp=parse_quantity(options["ramp"], "s", "--ramp"))
 
 
 def _fit_indentation(
     tables: SpecimenTables, kinds: list[str], options: dict[str, Any], sizes: dict[str, str | None]
 ) -> Any:
     from palpate.physics.materials import IndentationTest, fit
-    from palpate.units import to_si
+    from palpate.units import parse_quantity
 
-    lengths = {name: to_si(text, "m") for name, text in sizes.items() if text is not None}
+    lengths = {
+        name: parse_quantity(text, "m", f"--{name}") for name, text in sizes.items() if text is not None
+    }
     if not {"radius", "thickness"} <= lengths.keys():
         raise UsageError(
             "Radius of the ball and thickness of the slab are not known.",

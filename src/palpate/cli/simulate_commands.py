@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from palpate.cli.console import Console
+from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Json
 
 __all__ = ["simulate_app"]
@@ -24,24 +25,35 @@ simulate_app = typer.Typer(
 )
 
 Amplitude = Annotated[
-    float, typer.Option(min=-0.1, max=0.1, help="Stroke of the simulated hand, m; downwards first.")
+    float,
+    number_option(
+        "--amplitude", "m", least=-0.1, most=0.1, help="Stroke of the simulated hand, m; downwards first."
+    ),
 ]
-Frequency = Annotated[float, typer.Option(min=0.0, max=5.0, help="Strokes per second, Hz.")]
-Seconds = Annotated[float, typer.Option(min=0.1, help="Duration in seconds. Default: a day.")]
+Frequency = Annotated[
+    float, number_option("--frequency", "Hz", least=0.0, most=5.0, help="Strokes per second, Hz.")
+]
+Seconds = Annotated[
+    float, number_option("--seconds", "s", least=0.1, help="Duration in seconds. Default: a day.")
+]
 Folder = Annotated[Path, typer.Option(help="Folder that the library is put into.")]
 
 
 @simulate_app.command()
 def haply(
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the simulation channel.")] = 10001,
-    events: Annotated[int, typer.Option(min=0, max=65535, help="Port of the event channel.")] = 10020,
+    port: Annotated[
+        int, count_option("--port", least=0, most=65535, help="Port of the simulation channel.")
+    ] = 10001,
+    events: Annotated[
+        int, count_option("--events", least=0, most=65535, help="Port of the event channel.")
+    ] = 10020,
     amplitude: Amplitude = 0.03,
     frequency: Frequency = 0.5,
     spelling: Annotated[
         str, typer.Option(help="Spelling of a force that is understood: both, vector or values.")
     ] = "both",
     force_scale: Annotated[
-        float, typer.Option(help="Factor by which the service multiplies every force.")
+        float, number_option("--force-scale", help="Factor by which the service multiplies every force.")
     ] = 1.0,
     kind: Annotated[
         str, typer.Option("--type", help="Type of the device: inverse3, inverse3x, minverse, or any other.")
@@ -50,7 +62,10 @@ def haply(
         str, typer.Option(help="Grips that are connected: wireless, wired, both or none.")
     ] = "wireless",
     silence: Annotated[
-        float, typer.Option(min=0.001, help="Seconds without a command until the force lapses.")
+        float,
+        number_option(
+            "--silence", "s", least=0.001, help="Seconds without a command until the force lapses."
+        ),
     ] = 0.1,
     seconds: Seconds = 86400.0,
     as_json: Json = False,
@@ -79,10 +94,14 @@ def haply(
 
 @simulate_app.command()
 def crtk(
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the ROS bridge.")] = 9090,
+    port: Annotated[int, count_option("--port", least=0, most=65535, help="Port of the ROS bridge.")] = 9090,
     arm: Annotated[str, typer.Option(help="Namespace of the arm.")] = "arm",
-    rate: Annotated[float, typer.Option(min=1.0, max=10000.0, help="Positions per second, Hz.")] = 1000.0,
-    ros: Annotated[int, typer.Option(min=1, max=2, help="Version of ROS, whose types are understood.")] = 2,
+    rate: Annotated[
+        float, number_option("--rate", "Hz", least=1.0, most=10000.0, help="Positions per second, Hz.")
+    ] = 1000.0,
+    ros: Annotated[
+        int, count_option("--ros", least=1, most=2, help="Version of ROS, whose types are understood.")
+    ] = 2,
     amplitude: Amplitude = 0.03,
     frequency: Frequency = 0.5,
     seconds: Seconds = 86400.0,
@@ -112,7 +131,10 @@ def forcedimension(
     frequency: Frequency = 0.5,
     homed: Annotated[bool, typer.Option(help="Whether the device has been homed.")] = True,
     lost_after: Annotated[
-        int, typer.Option(min=0, help="Force commands after which the cable is pulled; 0 for never.")
+        int,
+        count_option(
+            "--lost-after", least=0, help="Force commands after which the cable is pulled; 0 for never."
+        ),
     ] = 0,
     as_json: Json = False,
 ) -> None:
@@ -138,10 +160,16 @@ def openhaptics(
     amplitude: Amplitude = 0.03,
     frequency: Frequency = 0.5,
     lost_after: Annotated[
-        int, typer.Option(min=0, help="Frames, of 1 ms, after which the cable is pulled; 0 for never.")
+        int,
+        count_option(
+            "--lost-after", least=0, help="Frames, of 1 ms, after which the cable is pulled; 0 for never."
+        ),
     ] = 0,
     warm_every: Annotated[
-        int, typer.Option(min=0, help="Frames from one complaint of warm motors to the next; 0 for none.")
+        int,
+        count_option(
+            "--warm-every", least=0, help="Frames from one complaint of warm motors to the next; 0 for none."
+        ),
     ] = 0,
     as_json: Json = False,
 ) -> None:

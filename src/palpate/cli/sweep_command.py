@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from palpate.cli.console import Console
+from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Json
 from palpate.errors import UsageError
 from palpate.processes import CASE_LIMIT
@@ -21,8 +22,9 @@ def sweep(
     ),
     samples: Annotated[
         int | None,
-        typer.Option(
-            min=1,
+        count_option(
+            "--samples",
+            least=1,
             help="Solves to learn from. Default: those of the study. A finished sweep is continued, not repeated. "
             "With --until: the most solves.",
         ),
@@ -35,15 +37,21 @@ def sweep(
         ),
     ] = None,
     minutes: Annotated[
-        float | None, typer.Option(min=0, help="With --until: minutes after which no further batch begins.")
+        float | None,
+        number_option(
+            "--minutes", least=0, help="With --until: minutes after which no further batch begins."
+        ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(min=1, help="Number of worker processes. Default: one per core.")
+        int | None,
+        count_option("--workers", least=1, help="Number of worker processes. Default: one per core."),
     ] = None,
     case_limit: Annotated[
         float,
-        typer.Option(
-            min=0.1,
+        number_option(
+            "--case-limit",
+            "s",
+            least=0.1,
             help="Seconds after which a single solve has failed. It costs that solve; the sweep goes on.",
         ),
     ] = CASE_LIMIT,

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from palpate.cli.console import Console
+from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Json, MissingOption, with_table_options
 
 __all__ = ["correct", "fit"]
@@ -30,13 +31,18 @@ def fit(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
     effort: Annotated[
-        float, typer.Option(help="Work of the search; 1 takes about half a minute, 0.1 gives a quick look.")
+        float,
+        number_option(
+            "--effort", help="Work of the search; 1 takes about half a minute, 0.1 gives a quick look."
+        ),
     ] = 1.0,
-    seconds: Annotated[float | None, typer.Option(help="Limit on time, in s. Default: none.")] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Number of worker processes.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="Decides everything that is drawn.")] = 0,
+    seconds: Annotated[
+        float | None, number_option("--seconds", "s", help="Limit on time, in s. Default: none.")
+    ] = None,
+    workers: Annotated[int, count_option("--workers", least=1, help="Number of worker processes.")] = 1,
+    seed: Annotated[int, count_option("--seed", least=0, help="Decides everything that is drawn.")] = 0,
     level: Annotated[
-        float, typer.Option(help="Share of unseen samples that the intervals are to hold.")
+        float, number_option("--level", help="Share of unseen samples that the intervals are to hold.")
     ] = 0.9,
     missing: MissingOption = "leave-out",
     reading: Any = None,
@@ -70,9 +76,10 @@ def correct(
     ] = False,
     port: Annotated[
         int | None,
-        typer.Option(
-            min=0,
-            max=65535,
+        count_option(
+            "--port",
+            least=0,
+            most=65535,
             help="Read lines from one connection to 127.0.0.1 at this port. 0: any free port. "
             "The first line must be the printed token.",
         ),
@@ -83,38 +90,56 @@ def correct(
     ] = None,
     offset: Annotated[
         float,
-        typer.Option(min=0, help="Uncertainty of the height of the surface, in m (one standard deviation)."),
+        number_option(
+            "--offset",
+            "m",
+            least=0,
+            help="Uncertainty of the height of the surface, in m (one standard deviation).",
+        ),
     ] = 5e-4,
     constant: Annotated[
         float,
-        typer.Option(
-            min=0,
+        number_option(
+            "--constant",
+            least=0,
             help="Uncertainty of the stiffness of the whole body, as a natural logarithm (one standard deviation).",
         ),
     ] = 0.5,
     varying: Annotated[
         float,
-        typer.Option(
-            min=0,
+        number_option(
+            "--varying",
+            least=0,
             help="Uncertainty of the stiffness from place to place, as a natural logarithm (one standard deviation).",
         ),
     ] = 0.3,
     noise: Annotated[
-        float, typer.Option(help="Noise of a measured force component, in N (one standard deviation).")
+        float,
+        number_option(
+            "--noise", "N", help="Noise of a measured force component, in N (one standard deviation)."
+        ),
     ] = 0.005,
     relative: Annotated[
         float,
-        typer.Option(
-            min=0, help="Noise of a measured force, as a share of its size (one standard deviation)."
+        number_option(
+            "--relative",
+            least=0,
+            help="Noise of a measured force, as a share of its size (one standard deviation).",
         ),
     ] = 0.01,
     jitter: Annotated[
-        float, typer.Option(min=0, help="Noise of the measured position, in m (one standard deviation).")
+        float,
+        number_option(
+            "--jitter", "m", least=0, help="Noise of the measured position, in m (one standard deviation)."
+        ),
     ] = 0.0,
     stall: Annotated[
-        float, typer.Option(min=0.1, help="A stream ends after so many seconds without a line.")
+        float,
+        number_option("--stall", "s", least=0.1, help="A stream ends after so many seconds without a line."),
     ] = 30.0,
-    wait: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for a connection.")] = 60.0,
+    wait: Annotated[
+        float, number_option("--wait", "s", least=0.1, help="Seconds to wait for a connection.")
+    ] = 60.0,
     token: Annotated[
         bool,
         typer.Option(

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from palpate.cli.number_options import count_option
 from palpate.errors import UsageError
 
 __all__ = ["Force", "Json", "MissingOption", "column_list", "with_table_options"]
@@ -35,9 +36,11 @@ def _reading_options(
         str | None, typer.Option(help="Decimal mark: . or , Default: found from the numbers.")
     ] = None,
     header: Annotated[
-        int | None, typer.Option(min=1, help="Number of the line that names the columns.")
+        int | None, count_option("--header", least=1, help="Number of the line that names the columns.")
     ] = None,
-    last: Annotated[int | None, typer.Option(min=1, help="Number of the last line of data.")] = None,
+    last: Annotated[
+        int | None, count_option("--last", least=1, help="Number of the last line of data.")
+    ] = None,
     sheet: Annotated[
         str | None, typer.Option(help="Sheet of a workbook (.xlsx). Default: its only one.")
     ] = None,

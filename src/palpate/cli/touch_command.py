@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Json
 from palpate.errors import UsageError
 
@@ -26,7 +27,9 @@ def touch(
         str | None, typer.Option(help="Unit of the file's numbers. Default: mm, or what fits.")
     ] = None,
     young: Annotated[str | None, typer.Option(help="Young's modulus. Default: 10 kPa.")] = None,
-    poisson: Annotated[float | None, typer.Option(help="Poisson's ratio. Default: 0.45.")] = None,
+    poisson: Annotated[
+        float | None, number_option("--poisson", help="Poisson's ratio. Default: 0.45.")
+    ] = None,
     radius: Annotated[
         str | None, typer.Option(help="Radius of the ball. Default: by the part's size.")
     ] = None,
@@ -42,10 +45,11 @@ def touch(
     ] = None,
     until: Annotated[str, typer.Option(help="Force error at the 95th percentile that ends it.")] = "2%",
     minutes: Annotated[
-        float, typer.Option(min=0, help="Minutes after which no further batch of solves begins.")
+        float,
+        number_option("--minutes", least=0, help="Minutes after which no further batch of solves begins."),
     ] = 30,
     workers: Annotated[
-        int | None, typer.Option(min=1, help="Worker processes. Default: one per core.")
+        int | None, count_option("--workers", least=1, help="Worker processes. Default: one per core.")
     ] = None,
     view: Annotated[
         bool | None,
@@ -56,7 +60,7 @@ def touch(
     start: Annotated[
         bool, typer.Option("--start", help="Begin at once with what is chosen, without a click on the page.")
     ] = False,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page.")] = 8080,
+    port: Annotated[int, count_option("--port", least=0, most=65535, help="Of the page.")] = 8080,
     device: Annotated[str, typer.Option(help="Device that presses; see [bold]palpate devices[/].")] = "page",
     as_json: Json = False,
 ) -> None:
@@ -122,10 +126,13 @@ def _write(part: Path, study: Study, notes: list[str]) -> Path:
 
 def _in_si(options: dict[str, Any]) -> dict[str, Any]:
     """Return options with their quantities in SI units."""
-    from palpate.units import to_si
+    from palpate.units import parse_quantity
 
     units = {"young": "Pa", "radius": "m", "depth": "m"}
-    return {name: to_si(value, units[name]) if name in units else value for name, value in options.items()}
+    return {
+        name: parse_quantity(value, units[name], f"--{name}") if name in units else value
+        for name, value in options.items()
+    }
 
 
 def _study_of(part: Path, options: dict[str, Any], console: Console) -> Study:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from palpate.cli.console import Console
+from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
 
@@ -273,10 +274,14 @@ def compare(
         typer.Option(help="Compare with the finite elements of this study file under the same hand."),
     ] = None,
     limit: Annotated[
-        float, typer.Option(min=1.0, help="For --full-model: seconds for all solves together.")
+        float,
+        number_option("--limit", "s", least=1.0, help="For --full-model: seconds for all solves together."),
     ] = 300.0,
     points: Annotated[
-        int, typer.Option(min=2, help="For --full-model: moments of the stroke that are solved at most.")
+        int,
+        count_option(
+            "--points", least=2, help="For --full-model: moments of the stroke that are solved at most."
+        ),
     ] = 200,
     out: Picture = None,
     as_json: Json = False,

@@ -23,6 +23,7 @@ from palpate.physics import (
     Rectangle,
     Section,
 )
+from palpate.records import Count, Metres, Number, Pair, QuarticMetres, Record, SquareMetres
 from palpate.study.material_records import (
     BeamMaterial,
     SolidMaterial,
@@ -30,7 +31,6 @@ from palpate.study.material_records import (
     build_material,
 )
 from palpate.study.part_records import PartRecord
-from palpate.study.quantities import Metres, Pair, QuarticMetres, Record, SquareMetres
 
 __all__ = [
     "BODIES",
@@ -66,7 +66,7 @@ class SectionRecord(Record):
     second_moment: QuarticMetres | None = Field(
         None, description="about the axis of bending", examples=["2 mm^4"]
     )
-    shear_factor: float | None = Field(
+    shear_factor: Number | None = Field(
         None, description="share of the area that carries shear", examples=[0.85]
     )
 
@@ -107,11 +107,11 @@ class CantileverRecord(Record):
     )
     kinematics: Literal["large", "small"] = Field("large", description="'small' is linear: for checks")
     self_weight: bool = Field(False, description="gravity, 9.80665 m/s² downwards")
-    elements: int = Field(20, ge=1, description="finite elements along the beam")
-    order: int = Field(3, ge=2, le=8, description="polynomial order of the elements")
+    elements: Count = Field(20, ge=1, description="finite elements along the beam")
+    order: Count = Field(3, ge=2, le=8, description="polynomial order of the elements")
     nodes: tuple[Metres, ...] = Field((), description="positions of interest; empty: six, evenly spaced")
-    fibres: int | None = Field(None, ge=4, description="layers of a section that yields", examples=[48])
-    tolerance: float | None = Field(
+    fibres: Count | None = Field(None, ge=4, description="layers of a section that yields", examples=[48])
+    tolerance: Number | None = Field(
         None,
         gt=0,
         description="largest relative error of a step, where the beam has a memory",
@@ -281,7 +281,7 @@ class OrganRecord(_SolidRecord):
     SURFACES: ClassVar[tuple[str, ...]] = ("front", "attached", "side")
     kind: Literal["organ"] = "organ"
     length: Metres = Field(0.20, gt=0, description="along x")
-    seed: int = Field(0, ge=0, description="which of the similar organs")
+    seed: Count = Field(0, ge=0, description="which of the similar organs")
     material: SolidMaterial = Field(_SOFT, description=_SOFT_MATERIAL)
     fixed: str | tuple[str, ...] = Field("attached", description=_FIXED)
 

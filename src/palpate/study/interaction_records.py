@@ -10,8 +10,8 @@ from palpate.physics import GluedPad, PointLoad, SphereProbe
 from palpate.physics.shapes.naming import members
 from palpate.physics.solid.body_family import BESIDE, UNITS
 from palpate.physics.solid.body_symmetry import fundamental_part
+from palpate.records import Count, Metres, Newtons, Number, PadStiffness, Pair, Record, Triple, in_si
 from palpate.study.body_records import BodyRecord
-from palpate.study.quantities import Metres, Newtons, PadStiffness, Pair, Record, Triple, in_si
 
 __all__ = [
     "INTERACTIONS",
@@ -34,7 +34,7 @@ class LoadRecord(Record):
     )
     low: Newtons = Field(description="smallest load")
     high: Newtons = Field(description="largest load")
-    direction: tuple[float, float] = Field((0.0, -1.0), description="(x, y); (0, -1) pushes down")
+    direction: tuple[Number, Number] = Field((0.0, -1.0), description="(x, y); (0, -1) pushes down")
 
     @model_validator(mode="after")
     def _a_range_and_a_direction(self) -> LoadRecord:
@@ -166,8 +166,8 @@ class VariedRecord(Record):
         description="REGION.young or another number of its material, LAYER.thickness, or probe.radius",
         examples=["fat.young"],
     )
-    low: float = Field(description='its least value, in SI units or such as "2 kPa"', examples=["2 kPa"])
-    high: float = Field(description="its largest value, likewise", examples=["8 kPa"])
+    low: Number = Field(description='its least value, in SI units or such as "2 kPa"', examples=["2 kPa"])
+    high: Number = Field(description="its largest value, likewise", examples=["8 kPa"])
 
     @field_validator("path")
     @classmethod
@@ -196,10 +196,10 @@ class VariedRecord(Record):
 class MemoryRecord(Record):
     """Histories of the load from which the memory of a body that yields or creeps is learnt."""
 
-    histories: int = Field(10, ge=1, description="histories to learn from")
-    unseen: int = Field(14, ge=1, description="further histories, for testing only")
-    seed: int = Field(1, ge=0, description="decides the histories; those for testing have another seed")
-    step: float = Field(0.05, gt=0, description="time between two samples in s, where time counts")
+    histories: Count = Field(10, ge=1, description="histories to learn from")
+    unseen: Count = Field(14, ge=1, description="further histories, for testing only")
+    seed: Count = Field(1, ge=0, description="decides the histories; those for testing have another seed")
+    step: Number = Field(0.05, gt=0, description="time between two samples in s, where time counts")
 
 
 InteractionRecord: TypeAlias = LoadsRecord | ProbeRecord | PadRecord

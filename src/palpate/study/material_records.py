@@ -31,8 +31,7 @@ from palpate.physics import (
     Yeoh,
     named_material,
 )
-from palpate.study.quantities import Densities, Pascals, Record
-from palpate.units import to_base_si
+from palpate.records import Densities, Number, Pascals, Record, in_si
 
 __all__ = [
     "BeamMaterial",
@@ -72,9 +71,9 @@ class MaterialRecord(Record):
 
     name: str = Field("own material", description="for the report")
     young: Pascals = Field(description="Young's modulus; of a material that creeps, at once after a load")
-    poisson: float = Field(0.3, description="Poisson's ratio")
+    poisson: Number = Field(0.3, description="Poisson's ratio")
     density: Densities = Field(0.0, description=_DENSITY)
-    prony: tuple[tuple[float, float], ...] = Field(
+    prony: tuple[tuple[Number, Number], ...] = Field(
         (), description="terms of creep: share of the stiffness that relaxes, and its time in s"
     )
 
@@ -89,10 +88,10 @@ class MaterialRecord(Record):
 class FibreRecord(Record):
     """A family of fibres (Holzapfel, Gasser & Ogden 2000; Gasser, Ogden & Holzapfel 2006)."""
 
-    direction: tuple[float, float, float] = Field(description="mean direction in the undeformed body")
+    direction: tuple[Number, Number, Number] = Field(description="mean direction in the undeformed body")
     k1: Pascals = Field(gt=0, description="modulus of the fibres", examples=["20 kPa"])
-    k2: float = Field(gt=0, description="exponent of the fibres, a pure number", examples=[5.0])
-    dispersion: float = Field(0.0, ge=0, le=1 / 3, description="0: aligned, 1/3: in all directions")
+    k2: Number = Field(gt=0, description="exponent of the fibres, a pure number", examples=[5.0])
+    dispersion: Number = Field(0.0, ge=0, le=1 / 3, description="0: aligned, 1/3: in all directions")
 
 
 class HardeningRecord(Record):
@@ -101,7 +100,9 @@ class HardeningRecord(Record):
     yield_stress: Pascals = Field(gt=0, description="stress of the first yield", examples=["125 MPa"])
     modulus: Pascals = Field(0.0, ge=0, description="linear part")
     saturation: Pascals = Field(0.0, ge=0, description="gain of the stress in the end")
-    rate: float | None = Field(None, gt=0, description="of the gain; needed with saturation", examples=[50.0])
+    rate: Number | None = Field(
+        None, gt=0, description="of the gain; needed with saturation", examples=[50.0]
+    )
 
     @model_validator(mode="after")
     def _saturation_with_its_rate(self) -> HardeningRecord:
@@ -138,7 +139,7 @@ class SolidMaterialRecord(Record):
         description="Young's modulus at small strains",
         examples=["9 kPa"],
     )
-    poisson: float = Field(_POISSON, ge=0, lt=0.5, description="Poisson's ratio at small strains")
+    poisson: Number = Field(_POISSON, ge=0, lt=0.5, description="Poisson's ratio at small strains")
     bulk: Pascals | None = Field(
         None,
         gt=0,
@@ -152,16 +153,16 @@ class SolidMaterialRecord(Record):
     mu: Pascals | tuple[Pascals, ...] | None = Field(
         None, description="ogden: of each term; ½ Σ μα is the shear modulus", examples=[["3 kPa", "0.1 kPa"]]
     )
-    alpha: float | tuple[float, ...] | None = Field(
+    alpha: Number | tuple[Number, ...] | None = Field(
         None, description="ogden: exponent of each term", examples=[[1.3, 5.0]]
     )
     density: Densities = Field(0.0, ge=0, description="for the record")
     fibres: tuple[FibreRecord, ...] = Field((), description="families of fibres in a matrix of this law")
-    stretch: tuple[float, float] | None = Field(
+    stretch: tuple[Number, Number] | None = Field(
         None, description="pre-stretch along x and y, with no stress along z", examples=[(1.1, 1.0)]
     )
     hardening: HardeningRecord | None = Field(None, description="linear-elastic only: beyond it, it yields")
-    prony: tuple[tuple[float, float], ...] = Field(
+    prony: tuple[tuple[Number, Number], ...] = Field(
         (), description="terms of relaxation: share of the shear stiffness, and its time in s"
     )
     module: str | None = Field(
@@ -186,7 +187,7 @@ class SolidMaterialRecord(Record):
     @classmethod
     def _constants_in_si(cls, constants: dict[str, float | str]) -> dict[str, float]:
         """Return the constants as numbers: of text with a unit, in SI units."""
-        return {name: _number_of(value) for name, value in constants.items()}
+        return {name: in_si(value, None) for name, value in constants.items()}
 
     @model_validator(mode="after")
     def _constants_of_its_law(self) -> SolidMaterialRecord:
@@ -237,16 +238,6 @@ class SolidMaterialRecord(Record):
         if self.bulk is not None:
             return law(**constants, bulk=self.bulk, **rest)
         return law.with_poisson(self.poisson, **constants, **rest)
-
-
-def _number_of(value: float | str) -> float:
-    """Return a number; of text with a unit, in SI base units."""
-    if not isinstance(value, str):
-        return float(value)
-    try:
-        return to_base_si(value)
-    except UsageError as error:
-        raise ValueError(str(error).replace("\n", " ")) from error
 
 
 def _user_material(record: SolidMaterialRecord) -> UserMaterial:

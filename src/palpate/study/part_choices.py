@@ -18,12 +18,12 @@ from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.naming import members
 from palpate.physics.shapes.step_patches import FacePatches
 from palpate.physics.shapes.triangle_list import triangle_text
+from palpate.record_complaints import complaints
 from palpate.study.interaction_records import ProbeRecord
 from palpate.study.material_records import SolidMaterialRecord
 from palpate.study.part_records import PartRecord
 from palpate.study.part_study import COARSE, HELD, TOUCHED
 from palpate.study.study import Study
-from palpate.study.toml import complaints
 
 if TYPE_CHECKING:
     from palpate.viewer.shown_part import PartChoices, ShownPart
@@ -109,7 +109,7 @@ def chosen_study(study: Study, choices: PartChoices) -> Study:
     try:
         return Study.model_validate(content)
     except ValidationError as error:
-        raise UsageError(" ".join(complaints(error)), fix="Change it on the page.") from error
+        raise UsageError(" ".join(complaints(error, Study)), fix="Change it on the page.") from error
 
 
 def _parts(study: Study) -> tuple[PartRecord, ProbeRecord]:

@@ -12,8 +12,8 @@ from palpate.physics import Body, ImportedMesh, ImportedSolid, SurfacePatch
 from palpate.physics.shapes.body_file import FEATURE_ANGLE, WITHIN
 from palpate.physics.shapes.naming import require_name
 from palpate.physics.shapes.triangle_list import read_triangles
+from palpate.records import Metres, Number, Record
 from palpate.study.material_records import SolidMaterial, build_material
-from palpate.study.quantities import Metres, Record
 
 __all__ = ["CAD_ENDINGS", "MESH_ENDINGS", "PartRecord", "PartSurfaceRecord", "part_shape"]
 
@@ -53,10 +53,10 @@ class PartSurfaceRecord(Record):
         None, description="lower corner of a box", examples=[["0 mm", "0 mm", "0 mm"]]
     )
     upper: Corner | None = Field(None, description="upper corner", examples=[["20 mm", "20 mm", "5 mm"]])
-    facing: str | tuple[float, float, float] | None = Field(
+    facing: str | tuple[Number, Number, Number] | None = Field(
         None, description="up, down, +x, -x, +y, -y, or (x, y, z): what faces that way", examples=["up"]
     )
-    within: float = Field(WITHIN, gt=0, le=180, description="largest angle from that direction, degrees")
+    within: Number = Field(WITHIN, gt=0, le=180, description="largest angle from that direction, degrees")
     triangles: str = Field(
         "",
         description="triangles of the surface as it is read, as `palpate touch` writes them; not for STEP",
@@ -151,7 +151,7 @@ class PartRecord(Record):
         description="largest element, where none touches; a mesh keeps its own",
         examples=["15 mm"],
     )
-    feature_angle: float | None = Field(
+    feature_angle: Number | None = Field(
         None,
         gt=0,
         le=180,

@@ -15,9 +15,10 @@ from pydantic import ValidationError
 from palpate import checks
 from palpate.errors import PalpateError, UsageError
 from palpate.physics.shapes.mesh import Face
+from palpate.record_complaints import complaints
 from palpate.study.part_records import CAD_ENDINGS, STEP_ENDINGS, PartRecord, part_shape
 from palpate.study.study import Study
-from palpate.study.toml import complaints, to_toml
+from palpate.study.toml import to_toml
 
 __all__ = ["part_study", "part_text", "study_file"]
 
@@ -215,7 +216,7 @@ def _study_of(content: dict[str, Any]) -> Study:
     except ValidationError as error:
         raise UsageError(
             f"No study of {content['body']['file']} can be made with these choices.",
-            why="\n".join(f"  {line}" for line in complaints(error)),
+            why="\n".join(f"  {line}" for line in complaints(error, Study)),
             fix="Change them; `palpate init` of the part lists its surfaces.",
         ) from error
 

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from palpate.errors import UsageError
 from palpate.learning import PRESETS, Refinement, Settings, recommended
 from palpate.learning.pressed_solves import FEWEST
-from palpate.study.quantities import Metres, Newtons, Record, Stiffness
+from palpate.records import Count, Metres, Newtons, Number, Record, Stiffness
 
 if TYPE_CHECKING:
     from palpate.validation import Limits
@@ -40,9 +40,9 @@ __all__ = [
 class _SweepRecord(Record):
     """Base of the tables `[sweep]`."""
 
-    samples: int = Field(40, ge=4, description="number of solves")
-    seed: int = Field(0, ge=0, description="decides the design")
-    workers: int | None = Field(None, ge=1, description="processes; left out: one per core", examples=[2])
+    samples: Count = Field(40, ge=4, description="number of solves")
+    seed: Count = Field(0, ge=0, description="decides the design")
+    workers: Count | None = Field(None, ge=1, description="processes; left out: one per core", examples=[2])
     scheduler: str | None = Field(
         None, description="a running Dask scheduler", examples=["tcp://127.0.0.1:8786"]
     )
@@ -59,7 +59,7 @@ class LoadSweepRecord(_SweepRecord):
     symmetric: ClassVar[bool] = False
 
     design: Literal["grid", "sobol", "random"] = Field("grid", description="how the ranges are sampled")
-    samples: int = Field(501, ge=4, description="number of solves")
+    samples: Count = Field(501, ge=4, description="number of solves")
 
     def arguments(self, problem: Any) -> dict[str, Any]:
         """Return the arguments of `palpate.sweep` that say where to solve."""
@@ -81,8 +81,8 @@ class PadSweepRecord(_SweepRecord):
 class ProbeSweepRecord(_SweepRecord):
     """Touches that are solved: depth series, each from shallow to deep."""
 
-    samples: int = Field(40, ge=FEWEST, description="number of solves")
-    depths: int = Field(5, ge=1, description="solves in a depth series")
+    samples: Count = Field(40, ge=FEWEST, description="number of solves")
+    depths: Count = Field(5, ge=1, description="solves in a depth series")
     symmetric: bool = Field(True, description="solve a part only, where mirror images give the rest")
     element: Metres | None = Field(
         None,
@@ -105,9 +105,9 @@ class ProbeSweepRecord(_SweepRecord):
 class LoadTestRecord(Record):
     """Solves that the network never sees."""
 
-    every: int = Field(2, ge=0, description="one row in so many of the sweep is kept for testing; 0: none")
-    random: int = Field(100, ge=0, description="further solves at random loads")
-    seed: int = Field(7, ge=0, description="decides what is random here")
+    every: Count = Field(2, ge=0, description="one row in so many of the sweep is kept for testing; 0: none")
+    random: Count = Field(100, ge=0, description="further solves at random loads")
+    seed: Count = Field(7, ge=0, description="decides what is random here")
 
     def arguments(self, problem: Any) -> dict[str, Any] | None:
         """Return the arguments of `palpate.sweep` that say where to test; None where nothing more is solved."""
@@ -118,8 +118,8 @@ class PadTestRecord(Record):
     """Displacements and places of the pad that the network never sees."""
 
     every: ClassVar[int] = 0
-    samples: int = Field(40, ge=1, description="number of solves")
-    seed: int = Field(7, ge=0, description="decides the design")
+    samples: Count = Field(40, ge=1, description="number of solves")
+    seed: Count = Field(7, ge=0, description="decides the design")
 
     def arguments(self, problem: Any) -> dict[str, Any] | None:
         """Return the arguments of `palpate.sweep` that say where to test."""
@@ -130,9 +130,9 @@ class ProbeTestRecord(Record):
     """Touches that the network never sees, in depth series of their own."""
 
     every: ClassVar[int] = 0
-    samples: int = Field(200, ge=1, description="number of solves")
-    depths: int = Field(4, ge=1, description="solves in a depth series")
-    seed: int = Field(7, ge=0, description="decides where the series are")
+    samples: Count = Field(200, ge=1, description="number of solves")
+    depths: Count = Field(4, ge=1, description="solves in a depth series")
+    seed: Count = Field(7, ge=0, description="decides where the series are")
 
     def arguments(self, problem: Any) -> dict[str, Any] | None:
         """Return the arguments of `palpate.sweep` that say where to test."""
@@ -142,12 +142,12 @@ class ProbeTestRecord(Record):
 class FilterRecord(Record):
     """The sequential filter (MRAN with an extended Kalman filter)."""
 
-    passes: int | None = Field(
+    passes: Count | None = Field(
         None,
         ge=1,
         description="shuffled presentations of the data; left out: 5, or enough for 1,250 observations",
     )
-    seed: int = Field(0, ge=0, description="decides the order")
+    seed: Count = Field(0, ge=0, description="decides the order")
     form: str | None = Field(
         None,
         description="a named form, such as 'founding', which repeats the papers'; left out: 'default' for one load, "
@@ -180,10 +180,10 @@ class FilterRecord(Record):
 class LoadLearningRecord(Record):
     """The refinement, and the coupling at the held node."""
 
-    samples: int = Field(26, ge=0, description="solves used for refinement; 0: all training solves")
-    units_max: int = Field(6, ge=0, description="most units per network")
-    target: float = Field(5e-7, ge=0.0, description="leave-one-out error at which growth stops")
-    starts: int = Field(4, ge=1, description="starts per number of units")
+    samples: Count = Field(26, ge=0, description="solves used for refinement; 0: all training solves")
+    units_max: Count = Field(6, ge=0, description="most units per network")
+    target: Number = Field(5e-7, ge=0.0, description="leave-one-out error at which growth stops")
+    starts: Count = Field(4, ge=1, description="starts per number of units")
     coupling: Stiffness | None = Field(
         None, description="between hand and node; left out: chosen from the data"
     )
@@ -197,22 +197,22 @@ class LoadLearningRecord(Record):
 class PadLearningRecord(Record):
     """The search for the network of the energy."""
 
-    effort: float = Field(1.0, gt=0, description="multiplies the work of the search; 0.1 is a quick look")
-    seconds: float | None = Field(
+    effort: Number = Field(1.0, gt=0, description="multiplies the work of the search; 0.1 is a quick look")
+    seconds: Number | None = Field(
         None,
         gt=0,
         description="limit on the time of learning; left out: none",
         examples=[60.0],
     )
-    workers: int | None = Field(
+    workers: Count | None = Field(
         None,
         ge=1,
         description="processes that search, with the same result; left out: one per core, eight at most",
         examples=[2],
     )
-    units_max: int = Field(160, ge=0, description="most units of the energy, mirror images among them")
-    target: float = Field(1e-3, ge=0.0, description="leave-one-out error at which growth stops")
-    seed: int = Field(0, ge=0, description="decides the starts")
+    units_max: Count = Field(160, ge=0, description="most units of the energy, mirror images among them")
+    target: Number = Field(1e-3, ge=0.0, description="leave-one-out error at which growth stops")
+    seed: Count = Field(0, ge=0, description="decides the starts")
 
     def options(self) -> dict[str, Any]:
         """Return the options of `palpate.learn`."""
@@ -228,14 +228,14 @@ class ProbeLearningRecord(PadLearningRecord):
 class LoadTargetRecord(Record):
     """Limits of `palpate validate` for the networks on unseen loads."""
 
-    rmse: float = Field(5e-6, gt=0, description="refined network, relative to full scale")
-    filter_rmse: float = Field(1e-3, ge=0, description="sequential filter alone; 0: not asked")
-    filter_outer_ratio: float = Field(
+    rmse: Number = Field(5e-6, gt=0, description="refined network, relative to full scale")
+    filter_rmse: Number = Field(1e-3, ge=0, description="sequential filter alone; 0: not asked")
+    filter_outer_ratio: Number = Field(
         2.0, ge=0, description="its error at the ends over the rest; 0: not asked"
     )
-    filter_regression: float = Field(2.0, ge=0, description="its error over its best so far; 0: not asked")
-    force_median: float = Field(0.01, gt=0, description="relative force error, median")
-    force_p95: float = Field(0.035, gt=0, description="relative force error, 95th percentile")
+    filter_regression: Number = Field(2.0, ge=0, description="its error over its best so far; 0: not asked")
+    force_median: Number = Field(0.01, gt=0, description="relative force error, median")
+    force_p95: Number = Field(0.035, gt=0, description="relative force error, 95th percentile")
 
     def limits(self) -> Limits:
         """Return the limits; a key that is 0 asks nothing."""
@@ -247,16 +247,16 @@ class LoadTargetRecord(Record):
 class TouchTargetRecord(Record):
     """Limits of `palpate validate` on unseen solves; 0: not asked."""
 
-    force_median: float = Field(0.01, ge=0, description="relative force error, median")
-    force_p95: float = Field(0.035, ge=0, description="relative force error, 95th percentile")
-    light_force_p95: float = Field(0.035, ge=0, description="of light touches, over f₀")
-    stiffness_p95: float = Field(0.08, ge=0, description="relative stiffness error, 95th percentile")
-    direction_p95: float = Field(5.0, ge=0, description="angle between the forces, degrees")
+    force_median: Number = Field(0.01, ge=0, description="relative force error, median")
+    force_p95: Number = Field(0.035, ge=0, description="relative force error, 95th percentile")
+    light_force_p95: Number = Field(0.035, ge=0, description="of light touches, over f₀")
+    stiffness_p95: Number = Field(0.08, ge=0, description="relative stiffness error, 95th percentile")
+    direction_p95: Number = Field(5.0, ge=0, description="angle between the forces, degrees")
     displacement_mean: Metres = Field(1e-4, ge=0, description="mean distance of the shown shape's nodes")
     displacement_max: Metres = Field(3e-4, ge=0, description="largest distance of a node")
-    smoothness: float = Field(1.5, ge=0, description="second difference of the force over the reference's")
-    loop_work: float = Field(1e-9, ge=0, description="work around closed paths over the stroke's energy")
-    coverage: tuple[float, float] = Field(
+    smoothness: Number = Field(1.5, ge=0, description="second difference of the force over the reference's")
+    loop_work: Number = Field(1e-9, ge=0, description="work around closed paths over the stroke's energy")
+    coverage: tuple[Number, Number] = Field(
         (0.80, 0.97),
         description="share of the errors that the 90 % interval holds, least and most; [0, 1]: not asked",
     )
@@ -275,8 +275,8 @@ class TouchTargetRecord(Record):
 class HistoryTargetRecord(Record):
     """Limits of `palpate validate` on unseen histories, over the largest force."""
 
-    force_median: float = Field(0.01, gt=0, description="force error, median")
-    force_p95: float = Field(0.035, gt=0, description="force error, 95th percentile")
+    force_median: Number = Field(0.01, gt=0, description="force error, median")
+    force_p95: Number = Field(0.035, gt=0, description="force error, 95th percentile")
 
     def limits(self) -> Limits:
         """Return the limits."""
@@ -288,9 +288,9 @@ class HistoryTargetRecord(Record):
 class RuntimeRecord(Record):
     """The 1 kHz loop and the page: what `palpate view` and `palpate run` do unless they are given options."""
 
-    rate: float = Field(1000.0, ge=10, le=10000, description="Hz")
+    rate: Number = Field(1000.0, ge=10, le=10000, description="Hz")
     max_force: Newtons = Field(12.0, gt=0, description="largest force; the force is limited to this")
-    port: int = Field(8080, ge=0, le=65535, description="of the page; a busy port moves on to the next")
+    port: Count = Field(8080, ge=0, le=65535, description="of the page; a busy port moves on to the next")
 
 
 SECTIONS: dict[str, dict[str, type[Any]]] = {

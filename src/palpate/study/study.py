@@ -10,9 +10,10 @@ from pydantic import Field, ValidationError, ValidationInfo, field_validator, mo
 from palpate.errors import UsageError
 from palpate.learning import FEWEST
 from palpate.physics import BodyFamily, Varied
+from palpate.record_complaints import complaints
+from palpate.records import Record
 from palpate.study.body_records import BodyRecord, CantileverRecord
 from palpate.study.interaction_records import InteractionRecord, MemoryRecord, VariedRecord
-from palpate.study.quantities import Record
 from palpate.study.stage_records import (
     SECTIONS,
     FilterRecord,
@@ -191,9 +192,9 @@ class Study(Record):
         try:
             return Study.model_validate(content)
         except ValidationError as error:
-            reason = str(error.errors(include_url=False)[0]["msg"]).removeprefix("Value error, ")
+            why = ". ".join(complaints(error, Study))
             raise UsageError(
-                f"{samples} solves do not suit this study.", why=f"{reason}.", fix="Give another number."
+                f"{samples} solves do not suit this study.", why=f"{why}.", fix="Give another number."
             ) from error
 
     def with_workers(self, workers: int | None) -> Study:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 import re
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, get_args
 
@@ -17,13 +16,11 @@ from tomlkit.items import AoT
 
 from palpate.errors import StudyError
 from palpate.file_kinds import file_kind, way_for
-from palpate.study.body_records import BODIES
-from palpate.study.interaction_records import INTERACTIONS
-from palpate.study.quantities import Unit
+from palpate.record_complaints import complaints, unit_in
 from palpate.study.study import Study
-from palpate.units import to_si
+from palpate.units import parse_quantity
 
-__all__ = ["complaints", "read_study", "study_schema", "to_toml"]
+__all__ = ["read_study", "study_schema", "to_toml"]
 
 _EXAMPLES = {"cantilever": "beam-nylon", "layered": "layered", "dome": "breast-dome", "organ": "liver"}
 """Presets that show every key of a kind of body; the block shows those of the others."""
@@ -71,18 +68,29 @@ def read_study(path: str | os.PathLike[str]) -> Study:
             fix="A study is a text file: write one with `palpate init`.",
         ) from error
     except tomllib.TOMLDecodeError as error:
-        twice = "overwrite" in str(error)
-        fix = "A key or a table stands there twice: keep one." if twice else "Correct that line."
-        raise StudyError(f"{path} is not valid TOML.", why=f"{error}.", fix=fix) from error
+        raise StudyError(
+            f"{path} is not valid TOML.", why=f"{error}.", fix=_way_to_toml(error, path)
+        ) from error
     try:
         return Study.model_validate(_beside(path.parent, _from_first_version(content)))
     except ValidationError as error:
         raise StudyError(
             f"{path} does not describe a study:",
-            why="\n".join(f"  {line}" for line in complaints(error)),
+            why="\n".join(f"  {line}" for line in complaints(error, Study)),
             fix=f"`palpate init {_example_of(content)} --print` shows every key with its meaning; "
             "`palpate schema` is for editors.",
         ) from error
+
+
+def _way_to_toml(error: tomllib.TOMLDecodeError, path: Path) -> str:
+    """Return what makes TOML of a file that is none."""
+    if "overwrite" in str(error):
+        return "A key or a table stands there twice: keep one."
+    line = re.search(r"at line ([0-9]+)", str(error))
+    text = path.read_text(encoding="utf-8").split("\n")[int(line[1]) - 1] if line else ""
+    if re.search(r"= *[-+]?[0-9]+,[0-9]+ *(#|$)", text.strip()):
+        return "A number without quotes has a decimal point: 0.45, not 0,45."
+    return "Correct that line."
 
 
 def _from_first_version(content: dict[str, Any]) -> dict[str, Any]:
@@ -247,7 +255,7 @@ def _add_key(table: Any, name: str, field: Any, value: Any) -> None:
         item: Any = tomlkit.inline_table()
         item.update(value)
     else:
-        unit = None if isinstance(value, str) else _unit((*field.metadata, field.annotation))
+        unit = None if isinstance(value, str) else unit_in((*field.metadata, field.annotation))
         item = tomlkit.item(_plain(value) if unit is None else _with_units(value, unit))
     if comment:
         item.comment(comment)
@@ -261,7 +269,7 @@ def _with_units(value: Any, unit: str) -> Any:
     units = _READABLE.get(unit, ())
     for name, size in units:
         text = f"{_digits(round(value / size, 9))} {name}"
-        if (abs(value) >= size or name == units[-1][0]) and to_si(text, unit) == value:
+        if (abs(value) >= size or name == units[-1][0]) and parse_quantity(text, unit) == value:
             return text
     return f"{_digits(float(value))} {unit}"
 
@@ -285,82 +293,3 @@ def _record_of(record: type[BaseModel], name: str, value: Any) -> type[BaseModel
         return None
     kinds = get_args(record.model_fields[name].annotation)
     return next((k for k in kinds if isinstance(k, type) and issubclass(k, BaseModel)), None)
-
-
-def _unit(parts: Iterable[Any]) -> str | None:
-    """Return the unit among a field's annotations, however deep."""
-    for part in parts:
-        if isinstance(part, Unit):
-            return part.name
-        if name := _unit((*get_args(part), *getattr(part, "__metadata__", ()))):
-            return name
-    return None
-
-
-def complaints(error: ValidationError) -> Iterator[str]:
-    """Yield one line per mistake: where, what, and the nearest key that exists."""
-    items = [(_place(item["loc"]), item) for item in error.errors(include_url=False)]
-    for place, item in items:
-        # what is wrong with a whole because of one of its parts, or of another form it might have had, is no news
-        if any(other != place and other[: len(place)] == place for other, _ in items):
-            continue
-        yield f"{'.'.join(place) or 'study'}: {_message(item)}"
-
-
-def _place(location: tuple[int | str, ...]) -> tuple[str, ...]:
-    """Return the keys that lead to a mistake; the tag of a union is no key of the file."""
-    tags = {"body": BODIES, "interaction": INTERACTIONS}
-    parts = [str(p) for i, p in enumerate(location) if not (i == 1 and p in tags.get(str(location[0]), ()))]
-    return tuple(p for p in parts if not _is_tag(p))
-
-
-def _is_tag(part: str) -> bool:
-    return part.endswith("Record") or part in {"str", "float"} or part.startswith("function-")
-
-
-def _message(item: Any) -> str:
-    kind, place, value = item["type"], item["loc"], item["input"]
-    if kind == "extra_forbidden":
-        close = difflib.get_close_matches(str(place[-1]), _keys_at(place[:-1]), n=1)
-        return "there is no such key" + (f"; did you mean {close[0]!r}?" if close else "")
-    if kind == "string_pattern_mismatch":
-        return f"{value!r} can't name files: letters, digits, dots, dashes and underscores can"
-    if kind == "union_tag_invalid":
-        known, tag = BODIES if place[0] == "body" else INTERACTIONS, str(item["ctx"]["tag"])
-        close = difflib.get_close_matches(tag, known, n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
-        return f"there is no kind of {place[0]} {tag!r}; there are {', '.join(known)}{hint}"
-    return str(item["msg"]).removeprefix("Value error, ")
-
-
-def _keys_at(place: tuple[int | str, ...]) -> set[str]:
-    """Return the keys of a study's table at a place."""
-    schema = Study.model_json_schema()
-    tables = list(_forms(schema, schema))
-    for key in place:
-        tables = [
-            form for table in tables for part in _parts(table, key, schema) for form in _forms(part, schema)
-        ]
-    return {key for table in tables for key in table.get("properties", {})}
-
-
-def _forms(part: dict[str, Any], schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield what a part of a schema stands for: of a union, each of its forms."""
-    if "$ref" in part:
-        yield from _forms(schema["$defs"][str(part["$ref"]).rpartition("/")[2]], schema)
-    elif forms := part.get("anyOf", part.get("oneOf")):
-        for form in forms:
-            yield from _forms(form, schema)
-    else:
-        yield part
-
-
-def _parts(table: dict[str, Any], key: int | str, schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield what lies below a table by a key, or below a list by a number; the tag of a union chooses its form."""
-    if key in table.get("properties", {}):
-        yield table["properties"][key]
-    elif not isinstance(key, int):
-        if table.get("properties", {}).get("kind", {}).get("const", key) == key:
-            yield table
-    elif "items" in table:
-        yield table["items"]

@@ -15,6 +15,7 @@ from typing import TypeAlias
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.number_text import BODY, GROUPED, plain_digits, plain_text
 
 __all__ = ["Cell", "Numerals", "is_missing", "is_numeral"]
 
@@ -37,11 +38,7 @@ _MISSING = {
     "1.#ind",
 }
 _MISSING |= {"na", "n/a", "n.a.", "#n/a", "#nv", "#na", "null", "none", "nil", "missing"}
-_SPACES = str.maketrans({"\xa0": " ", "\u202f": " ", "\u2009": " ", "’": "'", "−": "-"})
-_SHAPE = re.compile(
-    r"[+-]?(?P<body>(?:\d[\d.,' ]*\d|\d|[.,]\d+|\d+[.,])[.,]?)(?P<exponent>(?:[eEdD][+-]?|[+-])\d+)?"
-)
-_GROUPED = re.compile(r"[1-9]\d{0,2}(?:([.,' ])\d{3})(?:\1\d{3})*")
+_SHAPE = re.compile(rf"[+-]?(?P<body>{BODY}[.,]?)(?P<exponent>(?:[eEdD][+-]?|[+-])[0-9]+)?")
 _PLAIN = frozenset("0123456789+-.eE \n")
 
 
@@ -52,9 +49,9 @@ def is_missing(cell: str) -> bool:
 
 def is_numeral(cell: str) -> bool:
     """Return true of a cell that is a number in some convention."""
-    match = _SHAPE.fullmatch(cell.strip().translate(_SPACES))
+    match = _SHAPE.fullmatch(plain_text(cell))
     return match is not None and (
-        _possible(match["body"], ".") is not None or _possible(match["body"], ",") is not None
+        plain_digits(match["body"], ".") is not None or plain_digits(match["body"], ",") is not None
     )
 
 
@@ -127,33 +124,20 @@ class Numerals:
         return None
 
     def _value(self, cell: str) -> float:
-        match = _SHAPE.fullmatch(cell.strip().translate(_SPACES))
+        match = _SHAPE.fullmatch(plain_text(cell))
         if match is None:
             return np.nan
-        body = _possible(match["body"], self.decimal)
+        body = plain_digits(match["body"], self.decimal)
         if body is None:
             return np.nan
         exponent = (match["exponent"] or "").upper().replace("D", "E")
         if exponent and exponent[0] != "E":  # Fortran leaves the letter out before three digits
             exponent = f"E{exponent}"
-        sign = "-" if cell.strip().translate(_SPACES).startswith("-") else ""
+        sign = "-" if plain_text(cell).startswith("-") else ""
         return float(sign + body + exponent)
 
 
 _NAMES = {",": "comma", ".": "point"}
-
-
-def _possible(body: str, decimal: str) -> str | None:
-    """Return digits of a number with a decimal point, if they are one with this decimal mark; else None."""
-    whole, mark, fraction = body.partition(decimal)
-    if mark and not re.fullmatch(r"\d*", fraction):
-        return None
-    if not whole.isdigit() and whole:
-        match = _GROUPED.fullmatch(whole)
-        if match is None or match[1] == decimal:
-            return None
-        whole = whole.replace(match[1], "")
-    return f"{whole}.{fraction}" if mark and (whole or fraction) else whole or None
 
 
 @dataclass
@@ -185,12 +169,12 @@ class _Evidence:
         return found
 
     def _add(self, cell: Cell) -> None:
-        match = _SHAPE.fullmatch(cell[1].strip().translate(_SPACES))
+        match = _SHAPE.fullmatch(plain_text(cell[1]))
         if match is None:
             return
         body = match["body"]
         counts = {mark: body.count(mark) for mark in ",."}
-        readings = [mark for mark in ",." if _possible(body, mark) is not None]
+        readings = [mark for mark in ",." if plain_digits(body, mark) is not None]
         if len(readings) == 1 and any(counts.values()):
             decimal, other = readings[0], "." if readings[0] == "," else ","
             self.decimal[decimal] = self.decimal[decimal] or cell
@@ -211,7 +195,7 @@ def _grouped_by_dots(columns: Sequence[Sequence[Cell]]) -> Cell | None:
             continue
         whole = [text.strip().lstrip("+-") for _, text in column if "." not in text and not is_missing(text)]
         if (
-            all(_GROUPED.fullmatch(text.strip().lstrip("+-")) for _, text in pointed)
+            all(GROUPED.fullmatch(text.strip().lstrip("+-")) for _, text in pointed)
             and whole
             and all(text.isdigit() and len(text) <= 3 for text in whole)
         ):

@@ -37,7 +37,7 @@ from palpate.tables.table_layout import (
 )
 from palpate.tables.table_text import read_table_text
 from palpate.tables.unit_names import name_and_unit, plain_unit, si_unit
-from palpate.units import registry
+from palpate.unit_text import registry
 
 __all__ = ["Column", "Table", "read_table"]
 

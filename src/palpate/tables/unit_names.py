@@ -10,7 +10,7 @@ import functools
 import re
 
 from palpate.errors import UsageError
-from palpate.units import si_conversion
+from palpate.unit_text import si_conversion
 
 __all__ = ["is_unit", "name_and_unit", "plain_unit", "si_unit"]
 

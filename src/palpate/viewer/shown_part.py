@@ -6,8 +6,6 @@ PartChoices  what a person has chosen
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.units import to_si
+from palpate.units import parse_quantity
 from palpate.viewer.messages import Surface
 from palpate.viewer.part_messages import (
     FaceInfo,
@@ -28,8 +26,6 @@ from palpate.viewer.part_messages import (
 from palpate.viewer.surfaces import split
 
 __all__ = ["PartChoices", "ShownPart", "as_wish", "choices_of"]
-
-_BARE = re.compile(r"[-+]?[\d.]+([eE][-+]?\d+)?")
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,40 +194,18 @@ def choices_of(wish: StartWish, held: np.ndarray | None, touched: np.ndarray | N
     return PartChoices(
         material=wish.material,
         law=wish.law,
-        young=_quantity("Young's modulus", wish.young, "Pa", "10 kPa") if own else 0.0,
-        poisson=_pure_number("Poisson's ratio", wish.poisson) if own else 0.0,
-        radius=_quantity("The radius of the ball", wish.radius, "m", "6 mm"),
-        depth=_quantity("The depth", wish.depth, "m", "3 mm"),
+        young=_above_zero("Young's modulus", wish.young, "Pa") if own else 0.0,
+        poisson=parse_quantity(wish.poisson, "", "Poisson's ratio") if own else 0.0,
+        radius=_above_zero("The radius of the ball", wish.radius, "m"),
+        depth=_above_zero("The depth", wish.depth, "m"),
         held=held,
         touched=touched,
     )
 
 
-def _quantity(what: str, text: str, unit: str, example: str) -> float:
+def _above_zero(name: str, text: str, unit: str) -> float:
     """Return a quantity above zero in an SI unit; its text must say a unit."""
-    fix, plain = f"Write for example {example}.", _plain_text(text)
-    if _BARE.fullmatch(plain):
-        raise UsageError(f"{what} is {text.strip()} without a unit.", fix=fix)
-    try:
-        number = to_si(plain, unit)
-    except UsageError as error:
-        raise UsageError(
-            f"{what} is {text.strip() or 'missing'}, which is no such quantity.", fix=fix
-        ) from error
-    if not (number > 0 and math.isfinite(number)):
-        raise UsageError(f"{what} is {text.strip()}, which is not above zero.", fix=fix)
-    return number
-
-
-def _pure_number(what: str, text: str) -> float:
-    try:
-        return float(_plain_text(text))
-    except ValueError as error:
-        raise UsageError(
-            f"{what} is {text.strip() or 'missing'}, which is no number.", fix="Write for example 0.45."
-        ) from error
-
-
-def _plain_text(text: str) -> str:
-    """Return a text as programs write numbers: with a point, and a plain minus."""
-    return text.strip().replace("−", "-").replace("\N{NO-BREAK SPACE}", " ").replace(",", ".")
+    number = parse_quantity(text, unit, name)
+    if number > 0:
+        return number
+    raise UsageError(f"{name} is {text.strip()}, which is not above zero.", fix="Choose a larger one.")

@@ -233,7 +233,7 @@ def test_a_probe_with_forces_and_a_surface(tmp_path):
     [
         pytest.param(changed(inputs=[]), "names no inputs", id="no inputs"),
         pytest.param(changed(outputs=[]), "names no outputs", id="no outputs"),
-        pytest.param(changed(colour=1), "colour: Extra inputs", id="unknown key"),
+        pytest.param(changed(colour=1), "colour: there is no such key", id="unknown key"),
         pytest.param(changed(outputs=[{"name": "w"}]), "no column 'w'", id="no column"),
         pytest.param(
             changed(outputs=[{"name": "displacement", "from": "v"}]), "1 components for 2", id="components"

@@ -18,7 +18,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.tables import plain_unit
-from palpate.units import to_si
+from palpate.units import parse_quantity
 
 __all__ = ["NAMES", "Columns", "Measurements", "UnitError", "number"]
 
@@ -227,4 +227,4 @@ def _scale(unit: str, quantity: str, si_unit: str, spellings: Sequence[str]) -> 
             why="Units are written as they are here, and never guessed.",
             fix=f"Use one of {', '.join(spellings)}.",
         )
-    return to_si(f"1 {unit}", si_unit)
+    return parse_quantity(f"1 {unit}", si_unit)

@@ -13,8 +13,9 @@ from palpate.dataset.readers.mapping import ImportMapping, Input, Output
 from palpate.dataset.readers.result_units import values_in_si
 from palpate.dataset.readers.results import Column, Places, Results
 from palpate.errors import UsageError
+from palpate.number_text import leading_number
 from palpate.tables import plain_unit
-from palpate.units import si_conversion, to_si
+from palpate.unit_text import si_conversion
 
 __all__ = ["chosen_columns", "find_columns", "index_of_place", "places_in_metres"]
 
@@ -179,11 +180,9 @@ def _factor(times: float | str) -> tuple[float, str]:
     """Return a factor, and its SI unit where it is a quantity."""
     if not isinstance(times, str):
         return float(times), ""
-    match = re.match(r"^\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)$", times)
-    if match is None:
-        raise UsageError(f"{times!r} is no factor.", fix='Write a number, or a quantity such as "5 N".')
-    scale, offset, unit = si_conversion(plain_unit(match[2]))
-    return to_si(match[1], "") * scale + offset, unit
+    number = leading_number(times)
+    scale, offset, unit = si_conversion(plain_unit(number.rest))
+    return float(number.value) * scale + offset, unit
 
 
 def _reduce(results: Results, entry: Input | Output, column: Column, mapping: ImportMapping) -> Column:

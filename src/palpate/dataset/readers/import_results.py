@@ -24,7 +24,7 @@ from palpate.dataset.readers.results import Column, Results, join_cases, join_co
 from palpate.dataset.schema import Field, conjugate_unit
 from palpate.errors import UsageError
 from palpate.format import count
-from palpate.units import Range, to_si
+from palpate.units import Range, parse_quantity
 
 __all__ = ["Imported", "import_results", "read_files"]
 
@@ -125,12 +125,13 @@ def _with_numbers_of_names(results: Results, pattern: str) -> Results:
     columns = dict(results.columns)
     for name, text in match.groupdict().items():
         try:
-            value = float(text)
-        except (TypeError, ValueError):
+            value = parse_quantity(text, "")
+        except UsageError as error:
             raise UsageError(
                 f"{name!r} in the name of {results.source} is {text!r}, no number.",
+                why=error.why,
                 fix="Correct file_pattern; a point in an ending such as .frd may be too much.",
-            ) from None
+            ) from error
         columns[name] = Column(name, np.full(results.cases, value))
     return replace(results, columns=columns)
 
@@ -259,7 +260,7 @@ def _ranges(mapping: ImportMapping, inputs: np.ndarray, units: Sequence[str]) ->
         if mapping.mirrored and len(units) == 1 and entry.load is not None and 0 < low < high:
             low = 0.0  # no load, no deflection
         if entry.range is not None:
-            low, high = (to_si(end, unit) for end in entry.range)
+            low, high = (parse_quantity(end, unit, f"The range of {entry.name!r}") for end in entry.range)
         if not low < high:
             raise UsageError(
                 f"The input {entry.name!r} does not vary.",

@@ -29,28 +29,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from palpate.errors import UsageError
-from palpate.units import to_si
+from palpate.record_complaints import complaints
+from palpate.records import Count, Metres, Number, Record, in_si
 
 __all__ = ["ImportMapping", "Input", "Load", "Nodes", "Output", "read_mapping"]
 
-Place = int | tuple[float, ...]
+Place = Count | tuple[Metres, ...]
 
 
-class _Record(BaseModel):
-    """A table of the mapping; unknown keys are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-
-def _lengths(value: Any) -> Any:
-    """Return coordinates in m from numbers in m or texts such as ``"3 mm"``."""
-    return tuple(to_si(v, "m") for v in value) if isinstance(value, list | tuple) else value
-
-
-class Load(_Record):
+class Load(Record):
     """A force on one node.
 
     Attributes
@@ -62,20 +52,18 @@ class Load(_Record):
     """
 
     at: Place
-    direction: tuple[float, ...]
-
-    _in_metres = field_validator("at", mode="before")(_lengths)
+    direction: tuple[Number, ...]
 
 
-class _Source(_Record):
+class _Source(Record):
+    model_config = ConfigDict(populate_by_name=True)
+
     name: str
     source: str | tuple[str, ...] = Field(default="", alias="from")
     unit: str | None = None
     times: float | str = 1.0
     at: Place | None = None
     reduce: Literal["max", "min", "mean", "sum"] | None = None
-
-    _in_metres = field_validator("at", mode="before")(_lengths)
 
     @property
     def columns(self) -> str | tuple[str, ...]:
@@ -125,7 +113,7 @@ class Output(_Source):
     meaning: str = ""
 
 
-class Nodes(_Record):
+class Nodes(Record):
     """Nodes that are kept.
 
     Attributes
@@ -138,22 +126,12 @@ class Nodes(_Record):
         Axis along which the nodes are ordered.
     """
 
-    near: dict[str, float] = Field(default_factory=dict)
-    tolerance: float | None = None
+    near: dict[str, Metres] = Field(default_factory=dict)
+    tolerance: Metres | None = None
     sort: str | None = None
 
-    @field_validator("near", mode="before")
-    @classmethod
-    def _metres(cls, value: Any) -> Any:
-        return {k: to_si(v, "m") for k, v in value.items()} if isinstance(value, Mapping) else value
 
-    @field_validator("tolerance", mode="before")
-    @classmethod
-    def _tolerance(cls, value: Any) -> Any:
-        return to_si(value, "m") if isinstance(value, str) else value
-
-
-class ImportMapping(_Record):
+class ImportMapping(Record):
     """Meaning of the columns of another solver's results.
 
     Attributes
@@ -193,20 +171,10 @@ class ImportMapping(_Record):
     join: Literal["stem", "columns", "cases"] = "stem"
     file_pattern: str = ""
     nodes: Nodes | None = None
-    surfaces: dict[str, dict[str, float]] = Field(default_factory=dict)
+    surfaces: dict[str, dict[str, Metres]] = Field(default_factory=dict)
     mirrored: bool = False
     body: dict[str, Any] = Field(default_factory=dict)
     interactions: tuple[dict[str, Any], ...] = ()
-
-    @field_validator("surfaces", mode="before")
-    @classmethod
-    def _surfaces(cls, value: Any) -> Any:
-        if not isinstance(value, Mapping):
-            return value
-        return {
-            name: {axis: to_si(v, "m") for axis, v in at.items()} if isinstance(at, Mapping) else at
-            for name, at in value.items()
-        }
 
     @field_validator("interactions", mode="before")
     @classmethod
@@ -247,8 +215,8 @@ def _plain(value: Any) -> Any:
         return {key: _plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(entry) for entry in value]
-    if isinstance(value, str) and re.match(r"^[-+]?[\d.]", value):
-        return to_si(value, "m")
+    if isinstance(value, str) and re.match(r"\s*[-+−]?\s*[.,]?[0-9]", value):
+        return in_si(value, "m")
     return value
 
 
@@ -279,9 +247,8 @@ def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any] | ImportMapp
     try:
         return ImportMapping.model_validate(dict(source))
     except ValidationError as error:
-        lines = [f"  {'.'.join(map(str, e['loc'])) or 'mapping'}: {e['msg']}" for e in error.errors()]
         raise UsageError(
             f"{where} does not say what the columns are:",
-            why="\n".join(dict.fromkeys(lines)),
+            why="\n".join(f"  {line}" for line in complaints(error, ImportMapping, "mapping")),
             fix="The guide “Results of other solvers” has every key with its meaning.",
         ) from error

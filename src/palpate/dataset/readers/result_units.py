@@ -9,7 +9,7 @@ import numpy as np
 from palpate.dataset.readers.results import Column
 from palpate.errors import UsageError
 from palpate.tables.unit_names import plain_unit
-from palpate.units import si_conversion
+from palpate.unit_text import si_conversion
 
 __all__ = ["SYSTEM", "unit_of", "values_in_si"]
 

@@ -84,8 +84,17 @@ def device_named(device: str, commands: Block) -> Device:
 
 
 def _options(text: str) -> dict[str, str]:
-    pairs = [part.partition("=") for part in text.split(",") if part]
-    return {key.strip(): value.strip() for key, _, value in pairs}
+    options: dict[str, str] = {}
+    for part in filter(None, text.split(",")):
+        name, _, value = part.partition("=")
+        if options and part.strip().isdigit():
+            raise UsageError(
+                f"{part.strip()!r} stands behind a comma, and is no option of the device.",
+                why="Commas stand between the options of a device.",
+                fix=f"Write a number with a decimal point, such as {list(options)[-1]}=0.5.",
+            )
+        options[name.strip()] = value.strip()
+    return options
 
 
 def _kind(name: str) -> _Kind:

@@ -17,6 +17,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.runtime.safety import HARDWARE_PATIENCE
 from palpate.runtime.workspace import PLAIN_AXES, Axes
+from palpate.units import parse_quantity
 
 __all__ = ["Device", "Sample", "Traits", "free_buttons", "settings_from"]
 
@@ -185,11 +186,6 @@ def settings_from(kind: type[_Settings], options: Mapping[str, str]) -> _Setting
                 f"The device has no option {name!r}.",
                 fix=f"Its options are {', '.join(defaults) or 'none'}.",
             )
-        try:
-            values[name] = text if isinstance(defaults[name], str) else float(text)
-        except ValueError as error:
-            raise UsageError(
-                f"The device option {name}={text} is not a number.",
-                fix=f"For example {name}={defaults[name]}.",
-            ) from error
+        is_text = isinstance(defaults[name], str)
+        values[name] = text if is_text else parse_quantity(text, "", f"The device option {name}")
     return kind(**values)

@@ -3,6 +3,7 @@
 import { Role } from "./messages";
 import type { PartFacts, StartWish } from "./messages";
 import type { PartView, Pointed } from "./part_view";
+import { lengthOf } from "./lengths";
 import { element, input, tidy, worded } from "./units";
 
 const CLICK = 5; // px that a pointer may move and still click
@@ -121,6 +122,9 @@ export class Setup {
     };
     material.addEventListener("input", told);
     told();
+    const drawn = (): void => void (input("ball-radius").dataset["metres"] = String(lengthOf(input("ball-radius").value)));
+    input("ball-radius").addEventListener("input", drawn);
+    drawn();
     element("start").addEventListener("click", () => this.begin());
   }
 
@@ -264,12 +268,4 @@ export class Setup {
 /** An area as a person reads it. */
 function square(area: number): string {
   return area >= 1e-4 ? `${tidy(1e4 * area)} cm²` : `${tidy(1e6 * area)} mm²`;
-}
-
-const UNITS: Record<string, number> = { m: 1, cm: 0.01, mm: 1e-3, um: 1e-6, "µm": 1e-6, in: 0.0254 };
-
-/** A length in m, of a text with a common unit, for drawing; 0 where it is none. */
-function lengthOf(text: string): number {
-  const [, number, unit] = /^\s*([\d.]+)\s*([a-zµ]+)\s*$/.exec(text) ?? [];
-  return number && unit ? Number(number) * (UNITS[unit] ?? 0) : 0;
 }

@@ -4,7 +4,8 @@
 
 Each run is the loop as it is, from the encoder to the force sent, for a minute of its own time, computed as fast as it
 goes. The hand moves at random, or so as to shake, or goes after a recorded hand; then it presses and stays. The rival
-is the same loop without the passivity controller, and without the limit of the felt stiffness.
+is the same loop without the passivity controller, and without the limit of the felt stiffness. A second table has
+sensors as they are: steps, noise, and samples that are older than their time says.
 """
 
 from __future__ import annotations
@@ -43,6 +44,18 @@ RECORDED = 20.0  # s of the recorded touch, which is gone through over and over
 PRESS = 2.0  # s: the second one counts
 STEP = 1e-5  # m, of the encoder
 CALM = 1e-3  # m/s, rms, of a hand at rest
+SENSORS: dict[str, dict[str, float]] = {
+    "steps of 10 µm": {"step": 1e-5},
+    "steps of 55 µm": {"step": 5.5e-5},
+    "steps of 100 µm": {"step": 1e-4},
+    "noise of 5 µm": {"noise": 5e-6},
+    "noise of 20 µm": {"noise": 2e-5},
+    "noise of 50 µm": {"noise": 5e-5},
+    "noise of 300 µm": {"noise": 3e-4},
+    "jitter of 1 ms": {"noise": 5e-6, "jitter": 1e-3},
+}
+SENSED = 8.0  # s of each motion under a sensor
+SPEED = 0.2  # m/s, more than this hand's: what a jitter makes an error of place
 DEVICES = tuple({(p.radius, p.max_force): p for p in reversed(PROFILES.values())}.values())[::-1]
 
 
@@ -142,7 +155,122 @@ def tables(*, quick: bool = False) -> list[Table]:
         rows = [
             _row(name, body, pace, devices, seconds, file) for name, body in bodies.items() for pace in PACES
         ]
-    return [_table(rows, devices, seconds, quick=quick)]
+    sensed = [
+        _sensed_row(name, body, pace, quick=quick)
+        for name, body in bodies.items()
+        if not body.holds
+        for pace in (PACES[:1] if quick else ((1000.0, 0.0), (200.0, 0.0), (200.0, 0.005)))
+    ]
+    return [_table(rows, devices, seconds, quick=quick), _sensor_table(sensed, quick=quick)]
+
+
+@dataclass(frozen=True)
+class Sensed:
+    """What a hand feels through a sensor as it is.
+
+    Attributes
+    ----------
+    change : float
+        Largest change of the force from tick to tick after the first second, N.
+    air : float
+        Largest force out of the body, N.
+    stored, given : float
+        The most that the hand had put in, and what it was given on balance, J.
+    felt : float
+        The largest stiffness that the hand feels, N/m.
+    """
+
+    change: float
+    air: float
+    stored: float
+    given: float
+    felt: float
+
+    @classmethod
+    def of(
+        cls,
+        body: Touchable,
+        pace: tuple[float, float],
+        shape: str,
+        seconds: float,
+        sensor: dict[str, float],
+        *,
+        controlled: bool = True,
+    ) -> Sensed:
+        """Run the loop on a light device of 3 N for so many seconds of its own time."""
+        rate, delay = pace
+        space = body.workspace(0.1)
+        stroke: dict[str, Any] = body.stroke(space.scale) or {}
+        settings = SimulatedSettings(
+            **{**stroke, "mass": 0.1, "grip_damping": 3.0, "frequency": 0.5, "shape": shape, "delay": delay, **sensor}
+        )  # fmt: skip
+        hand = SimulatedHand(settings)
+        loop = Loop(
+            *(body, hand, Shared.private(), space, Limits(3.0)),
+            rate=rate,
+            stiffness=body.stiffness_max,
+            control=controlled,
+        )
+        inwards, reach = np.array([settings.x, settings.y, settings.z]), 0.1 * settings.amplitude
+        before, change, air, lowest = np.zeros(3), 0.0, 0.0, 0.0
+        for k in range(round(seconds * rate)):
+            loop.tick(k / rate)
+            force = loop.out.force.copy()
+            if k > rate:
+                change = max(change, float(np.linalg.norm(force - before)))
+            if hand.place @ inwards < -reach:
+                air = max(air, float(np.linalg.norm(force)))
+            before, lowest = force, min(lowest, hand.work)
+        return cls(change, air, -lowest, hand.work, loop.bounds.felt)
+
+
+def _sensed_row(name: str, body: Touchable, pace: tuple[float, float], *, quick: bool) -> dict[str, Any]:
+    seconds = 2.0 if quick else SENSED
+    sensors = dict(list(SENSORS.items())[:2]) if quick else SENSORS
+    shares, airs, given = [], [], []
+    for shape in ("press", "sine"):
+        clean = Sensed.of(body, pace, shape, seconds, {})
+        for sensor in sensors.values():
+            run = Sensed.of(body, pace, shape, seconds, sensor)
+            error = max(sensor.get("noise", 0.0), sensor.get("step", 0.0), SPEED * sensor.get("jitter", 0.0))
+            shares.append((run.change - clean.change) / (12.0 * run.felt * error))
+            airs.append(run.air)
+            given.append(run.given / (0.01 * run.stored + 1e-4))
+    bare = Sensed.of(body, pace, "sine", seconds, {}, controlled=False)
+    return {
+        "body": name,
+        "pace": f"{pace[0]:g} Hz, {1e3 * pace[1]:g} ms",
+        "change": max(shares),
+        "air": max(airs),
+        "given": max(given),
+        "bare": bare.given / (0.01 * bare.stored + 1e-4),
+    }
+
+
+def _sensor_table(rows: list[dict[str, Any]], *, quick: bool) -> Table:
+    return Table(
+        "hand-sensors",
+        f"Sensors as they are, {len(SENSORS)} of them{' (quick: two)' if quick else ''}, held still and moving",
+        (
+            Column("body", "body"),
+            Column("pace", "rate, delay"),
+            Column("change", "change of the force beyond the clean run's, over 12 K σ", ".2f"),
+            Column("air", "largest force in the air, N", ".1g"),
+            Column("given", "energy given, over 1 % of what was put in + 0.1 mJ", ".2f"),
+            Column("bare", "without the controller: the same", ".2f"),
+        ),
+        rows,
+        [
+            Claim("change of the force over 12 K σ", (max(r["change"] for r in rows),), 1.0, ".2f"),
+            Claim("force in the air, N", (max(r["air"] for r in rows),), 1e-3, ".1g"),
+            Claim("energy given over its bound", (max(r["given"] for r in rows),), 1.0, ".2f"),
+        ],
+        (
+            "the worst of " + ", ".join(SENSORS),
+            "σ is the larger of noise and step, K the stiffest touch in the hand; a device of 0.1 kg and 3 N",
+            "a negative energy was taken from the hand",
+        ),
+    )
 
 
 def _table(

@@ -13,14 +13,18 @@ import pytest
 from evdev_double import Pad
 from library_double import LibraryDouble
 from spnav_double import Daemon
+from standins import STIFFNESS, PlainModel
 
 from palpate.errors import UsageError
 from palpate.runtime.device_doubles import DOUBLES
 from palpate.runtime.devices import Sample, device_named, device_names, device_traits
 from palpate.runtime.devices.crtk_simulator import CrtkSimulator, CrtkSimulatorSettings
 from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
+from palpate.runtime.loop import Loop
 from palpate.runtime.recording import FLAGS, TICK
+from palpate.runtime.safety import Limits
 from palpate.runtime.trace_file import TraceWriter
+from palpate.runtime.workspace import Workspace
 
 # settings of the doubles; a thread that calls back must not do so while tracemalloc stops, which Python doesn't bear
 STARTS = {"forcedimension": {"manual": 1}, "openhaptics": {"speed": 20, "manual_after": 50}}
@@ -91,6 +95,9 @@ def test_traits_are_physical(name):
     assert 0.0 < traits.max_force < 100.0
     assert traits.damping is None or traits.damping >= 0.0
     assert traits.source
+    assert (traits.damping is None) <= (traits.resolution == 0.0), (
+        "the steps of a sensor are stated where motors push"
+    )
     assert device_traits(f"{name}:some=option") == traits
 
 
@@ -137,6 +144,46 @@ def test_keeps_no_memory_per_tick(device):
     after = kept_after(range(200, 1200))
     tracemalloc.stop()
     assert after - before < 1000, "bytes left after a thousand ticks"
+
+
+class Sensor:
+    """A device whose places have noise, steps, and now and then come a tick late, whatever its own are."""
+
+    def __init__(self, device, noise=5e-5, step=5.5e-5):
+        self.device, self.noise, self.step = device, noise, step
+        self._random, self._sample, self._before = np.random.default_rng(2), None, np.zeros(3)
+
+    def __getattr__(self, name):
+        return getattr(self.device, name)
+
+    def read(self, now):
+        sample = self.device.read(now)
+        self._sample = self._sample or Sample(sample.patience)
+        for field in set(Sample.__slots__) - {"position"}:
+            setattr(self._sample, field, getattr(sample, field))
+        late = self._random.random() < 0.2
+        true, self._before = self._before if late else sample.position, sample.position.copy()
+        noisy = true + self.noise * self._random.normal(size=3)
+        self._sample.position[:] = self.step * np.round(noisy / self.step)
+        return self._sample
+
+
+def test_a_noisy_sensor_of_any_device_does_not_shake_the_force(device, shared):
+    """From tick to tick the force changes by what a spring answers to way and noise, and not by more than 12 K σ."""
+    traits, places, forces = device.traits, [], []
+    sensor, model = Sensor(device), PlainModel()
+    loop = Loop(
+        model, sensor, shared, Workspace(traits.radius, 1.0), Limits(traits.max_force), stiffness=STIFFNESS
+    )
+    for k in range(600):
+        loop.tick(1e-3 * k)
+        places.append(sensor._before.copy())
+        if loop.open:
+            forces.append(loop.out.force.copy())
+    way = np.linalg.norm(np.diff(places, axis=0), axis=1).max()
+    change = np.linalg.norm(np.diff(forces, axis=0), axis=1).max() if len(forces) > 1 else 0.0
+    ramp = STIFFNESS * traits.radius * 1e-3 / 0.05
+    assert change <= 12.0 * STIFFNESS * 5.5e-5 + 2.0 * STIFFNESS * way + ramp
 
 
 def test_unknown_options_are_listed(name, shared):

@@ -211,7 +211,7 @@ class PlaceCheck:
 
     A single bad sample is passed over. After a doubt, a place that is merely sudden is believed: a handle that hits its
     end stop is that once. Each doubt counts 1, each believed sample takes a tenth of one away, and a count of three is
-    a fault: three bad samples in a row, or nine samples to and fro, and never one in eleven. 15 ms of doubts are a fault
+    a fault: three bad samples in a row, or nine to and fro, and never one in eleven. 15 ms of doubts are a fault
     too. After three in a row the newest place is what the next one is compared with, so that an arm which was moved
     while nobody looked is believed again.
 

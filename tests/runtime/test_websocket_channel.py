@@ -29,8 +29,8 @@ class Clock:
         return STEP * self.looks
 
 
-def frame(content=b"", opcode=Opcode.TEXT):
-    return Frame(opcode, content).serialize(mask=False)
+def frame(content=b"", opcode=Opcode.TEXT, *, fin=True):
+    return Frame(opcode, content, fin=fin).serialize(mask=False)
 
 
 @contextlib.contextmanager
@@ -63,68 +63,63 @@ def service(content, *, ends=False):
         listener.close()
 
 
-def open_channel(url):
+def calls_until_message(channel, clock):
+    """Return the first messages, and how many calls it took; each call keeps to its budget."""
+    for calls in itertools.count(1):
+        before = clock.looks
+        messages = channel.receive(0.0)
+        assert clock.looks - before <= 2 + BUDGET / STEP
+        if messages:
+            return messages, calls
+    return [], 0
+
+
+@contextlib.contextmanager
+def opened(content, *, ends=False):
+    """A channel to a service that sends these bytes, its clock, and what the service has received."""
     clock = Clock()
-    return WebsocketChannel(url, "a service", clock), clock
+    with service(content, ends=ends) as (url, received):
+        channel = WebsocketChannel(url, "a service", clock)
+        yield channel, clock, received
+        channel.close()
 
 
 def test_pings_without_end_cost_a_call_no_more_than_its_budget():
     """Each takes a look at the clock after 256 bytes: 80 kB of pings are 310 looks, in calls of a few."""
-    with service(frame(opcode=Opcode.PING) * 40_000 + frame(b"at last")) as (url, received):
-        channel, clock = open_channel(url)
-        for calls in itertools.count(1):
-            before = clock.looks
-            messages = channel.receive(0.0)
-            assert clock.looks - before <= 2 + BUDGET / STEP
-            if messages:
-                break
-        channel.close()
+    with opened(frame(opcode=Opcode.PING) * 40_000 + frame(b"at last")) as (channel, clock, received):
+        messages, calls = calls_until_message(channel, clock)
     assert messages == ["at last"]
     assert calls > 80
     assert sum(map(len, received)) > 0, "pings are answered"
 
 
-def test_numbers_of_nearly_a_megabyte_are_no_message_of_a_device():
-    with service(frame(b"[" + b"0.123," * 150_000 + b"0]")) as (url, _):
-        channel, clock = open_channel(url)
-        with pytest.raises(DeviceLostError, match="32768 bytes"):
-            for _ in range(10_000):
-                before = clock.looks
-                assert channel.receive(0.0) == []
-                assert clock.looks - before <= 2 + BUDGET / STEP
-        channel.close()
+IN_PIECES = frame(b"[", fin=False) + frame(b"0.123," * 100, Opcode.CONT, fin=False) * 1000
 
 
-def test_a_message_in_pieces_is_bounded_as_a_whole():
-    pieces = [Frame(Opcode.CONT, b"0.123," * 100, fin=False).serialize(mask=False)] * 1000
-    first = Frame(Opcode.TEXT, b"[", fin=False).serialize(mask=False)
-    with service(first + b"".join(pieces)) as (url, _):
-        channel, _ = open_channel(url)
-        with pytest.raises(DeviceLostError, match="32768 bytes"):
-            for _ in range(10_000):
-                assert channel.receive(0.0) == []
-        channel.close()
+@pytest.mark.parametrize(
+    "content", [frame(b"[" + b"0.123," * 150_000 + b"0]"), IN_PIECES], ids=["whole", "in pieces"]
+)
+def test_numbers_of_nearly_a_megabyte_are_no_message_of_a_device(content):
+    with opened(content) as (channel, clock, _), pytest.raises(DeviceLostError, match="32768 bytes"):
+        calls_until_message(channel, clock)
 
 
 def test_many_messages_come_in_their_order_a_few_to_each_call():
     texts = [str(k) for k in range(500)]
-    with service(b"".join(frame(text.encode()) for text in texts)) as (url, _):
-        channel = WebsocketChannel(url, "a service")
+    with opened(b"".join(frame(text.encode()) for text in texts)) as (channel, _, _):
         seen = []
         while len(seen) < len(texts):
             came = channel.receive(1.0)
             assert 0 < len(came) <= 16
             seen += came
-        channel.close()
     assert seen == texts
 
 
 def test_what_was_sent_before_the_end_is_read_first():
-    with service(frame(b"one") * 40, ends=True) as (url, _):
-        channel = WebsocketChannel(url, "a service")
+    with opened(frame(b"one") * 40, ends=True) as (channel, _, _):
         seen = []
+        while len(seen) < 40:
+            seen += channel.receive(1.0)
         with pytest.raises(DeviceLostError, match="closed the connection"):
-            while True:
-                seen += channel.receive(1.0)
-        channel.close()
+            channel.receive(1.0)
     assert seen == ["one"] * 40

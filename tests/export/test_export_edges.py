@@ -13,6 +13,7 @@ import onnx
 import onnxruntime
 import pytest
 from fmpy.fmi1 import FMICallException
+from test_fmu_exchange import FORCE, PLACE, instances
 
 from exported_bodies import BODIES, body, networks
 from palpate.errors import UsageError
@@ -26,7 +27,6 @@ from palpate.export.fmu_export import VERSIONS
 from palpate.export.onnx_export import OnnxAsker, export_onnx
 from palpate.export.wasm_core import WasmCore
 from system_programs import require_program
-from test_fmu_exchange import FORCE, PLACE, instances
 
 HUGE = (math.nan, math.inf, -math.inf, 1e160, 1e300, -1e300)
 ELASTIC = ("contact", "pad", "iwan")  # a probe, and two kinds of what is held
@@ -146,7 +146,12 @@ def test_an_fmu_has_no_rates_or_values_for_a_solver_at_no_place(version, tmp_pat
 def test_what_is_set_must_be_a_number(tmp_path):
     file = export_fmu(body("pad"), tmp_path / "body.fmu", check=False).path
     with instances(file, False) as (description, steps):
-        for name, bad in (("force_scale", math.nan), ("damping", -1.0), ("damping", math.nan), ("mass", math.inf)):
+        for name, bad in (
+            ("force_scale", math.nan),
+            ("damping", -1.0),
+            ("damping", math.nan),
+            ("mass", math.inf),
+        ):
             reference = next(v.valueReference for v in description.modelVariables if v.name == name)
             with pytest.raises(FMICallException):
                 steps.write([reference], [bad])
@@ -223,7 +228,9 @@ def test_short_steps_of_a_master_need_no_damping_and_no_warning(master):
 def test_the_warning_says_what_to_do(tmp_path):
     file = export_fmu(body("contact"), tmp_path / "block.fmu", fmi="3.0", check=False).path
     folder, words = fmpy.extract(str(file)), []
-    steps = open_instance(fmpy.read_model_description(str(file)), folder, log=lambda *args: words.append(args[-1]))
+    steps = open_instance(
+        fmpy.read_model_description(str(file)), folder, log=lambda *args: words.append(args[-1])
+    )
     steps.begin()
     steps.write(PLACE, [0.0, 0.0, 0.01 - DEEP])
     steps.step(0.0, 0.01)

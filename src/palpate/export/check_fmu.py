@@ -88,9 +88,7 @@ class _Instance:
 class _Instance2(_Instance):
     """An instance of FMI 2.0, see `FmuInstance`."""
 
-    def __init__(
-        self, description: Any, folder: str, log: Callable[..., None], *, exchange: bool
-    ) -> None:
+    def __init__(self, description: Any, folder: str, log: Callable[..., None], *, exchange: bool) -> None:
         from fmpy.fmi2 import (
             FMU2Model,
             FMU2Slave,
@@ -126,9 +124,7 @@ class _Instance2(_Instance):
 class _Instance3(_Instance):
     """An instance of FMI 3.0, see `FmuInstance`."""
 
-    def __init__(
-        self, description: Any, folder: str, log: Callable[..., None], *, exchange: bool
-    ) -> None:
+    def __init__(self, description: Any, folder: str, log: Callable[..., None], *, exchange: bool) -> None:
         from fmpy.fmi3 import FMU3Model, FMU3Slave
 
         self.fmu = (FMU3Model if exchange else FMU3Slave)(**_identity(description, folder, exchange=exchange))

@@ -103,7 +103,7 @@ class Value:
         return self.graph.op("Slice", self, numbers[0], numbers[1], numbers[2])
 
     def rows_as(self, *shape: int) -> Value:
-        """Return the tensor (N, …) with another shape (N, *shape) of its rows; N may be 0, so no length is left open."""
+        """Return the tensor (N, …) with another shape of its rows, (N, *shape); N may be 0."""
         return self.graph.op("Reshape", self, self.graph.integers([0, *shape]))
 
     def spread(self, *axes: int) -> Value:

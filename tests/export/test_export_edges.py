@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import shutil
 import subprocess
 
@@ -313,3 +314,49 @@ def test_the_header_and_the_files_are_cpp_too(compiler, name, single, tmp_path):
     for file in (*done.sources, done.example):
         came = subprocess.run([path, *strict, str(file)], capture_output=True, text=True, check=False)
         assert came.returncode == 0, came.stderr[:3000]
+
+
+def test_a_program_in_cpp_calls_a_library_in_c(tmp_path):
+    gcc, cpp = require_program("gcc"), require_program("g++")
+    done = export_c(body("pad"), tmp_path, check=False)
+    subprocess.run([gcc, "-O1", "-c", str(done.sources[0]), "-o", str(tmp_path / "pad.o")], check=True)
+    program = str(tmp_path / "press")
+    subprocess.run(
+        [cpp, "-x", "c++", str(done.example), "-x", "none", str(tmp_path / "pad.o"), "-o", program],
+        check=True,
+    )
+    assert subprocess.run([program], capture_output=True, text=True, check=True).stdout.count(" N") == 11
+
+
+@pytest.mark.parametrize("level", ["-O2", "-O3"])
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("name", ["contact", "relaxation", "iwan", "network"])
+def test_the_stack_is_smaller_than_the_header_says(name, single, level, tmp_path):
+    """All frames of the core together are more than any chain of calls takes: nothing calls itself."""
+    gcc = require_program("gcc")
+    thing = networks()[1] if name == "network" else body(name)
+    done = export_c(thing, tmp_path, check=False, single=single)
+    options = (level, "-c", "-fstack-usage", str(done.sources[0]), "-o", str(tmp_path / "all.o"))
+    subprocess.run([gcc, *options], check=True)
+    rows = [line.split("\t") for line in (tmp_path / "all.su").read_text("utf-8").splitlines()]
+    assert {kind for *_, kind in rows} == {"static"}
+    own = [int(size) for place, size, _ in rows if f":{done.name}_" in place]
+    core = [int(size) for place, size, _ in rows if f":{done.name}_" not in place]
+    said = re.search(r"Stack: less than (\d+) kB", done.files[0].read_text("utf-8"))
+    assert said is not None
+    assert sum(core) + max(own) < 1000 * int(said[1])
+
+
+def test_the_header_says_how_long_an_answer_takes_and_how_precise_it_is(tmp_path):
+    thing = body("contact")
+    texts = [
+        export_c(thing, tmp_path / str(single), check=False, single=single).files[0].read_text("utf-8")
+        for single in (False, True)
+    ]
+    assert "exported with --float they are of single" in texts[0]
+    assert "Numbers are of single precision" in texts[1]
+    for text in texts:
+        answer, deviation = map(float, re.findall(r"([\d.]+) thousand", text))
+        root = thing.energy.root
+        assert answer * 1e3 > 40 * len(thing.energy.network.factors), "an exponential for each unit"
+        assert deviation * 1e3 > 4 * root.shape[1] ** 2, "a triangle of the root, four times"

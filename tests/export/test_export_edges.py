@@ -72,7 +72,7 @@ EXPORTS = {"c": from_gcc, "wasm": from_wasm, "onnx": from_onnx, "fmu": from_fmu}
 
 
 @pytest.mark.parametrize("export", EXPORTS)
-@pytest.mark.parametrize("name", ELASTIC)
+@pytest.mark.parametrize("name", ["iwan", "pad", pytest.param("contact", marks=pytest.mark.slow)])
 def test_what_has_no_answer_pushes_nobody_and_is_flagged(export, name, tmp_path):
     """A probe that is far away touches nothing, which is an answer; what is held and far away has none."""
     thing = elastic(name)
@@ -271,7 +271,7 @@ def test_damping_is_against_the_velocity_and_its_derivatives_are_true(name, vers
         np.testing.assert_allclose(by_damping, (damped - free) / d, rtol=1e-6)
 
 
-ROWLESS = [(name, single) for name in BODIES for single in (False, True)]
+ROWLESS = [(name, single) for name in BODIES for single in (False, True) if not single or name in ELASTIC]
 
 
 @pytest.mark.parametrize(("name", "single"), ROWLESS)
@@ -304,8 +304,8 @@ def test_nodes_are_named_by_what_they_work_out(tmp_path):
     }
 
 
-@pytest.mark.parametrize("compiler", ["g++", "clang++"])
-@pytest.mark.parametrize("name", ["contact", "relaxation", "iwan"])
+@pytest.mark.parametrize("compiler", ["g++", pytest.param("clang++", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["contact", "iwan", pytest.param("relaxation", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("single", [False, True])
 def test_the_header_and_the_files_are_cpp_too(compiler, name, single, tmp_path):
     path = require_program(compiler)
@@ -328,15 +328,14 @@ def test_a_program_in_cpp_calls_a_library_in_c(tmp_path):
     assert subprocess.run([program], capture_output=True, text=True, check=True).stdout.count(" N") == 11
 
 
-@pytest.mark.parametrize("level", ["-O2", "-O3"])
 @pytest.mark.parametrize("single", [False, True])
-@pytest.mark.parametrize("name", ["contact", "relaxation", "iwan", "network"])
-def test_the_stack_is_smaller_than_the_header_says(name, single, level, tmp_path):
+@pytest.mark.parametrize("name", ["contact", "network", pytest.param("relaxation", marks=pytest.mark.slow)])
+def test_the_stack_is_smaller_than_the_header_says(name, single, tmp_path):
     """All frames of the core together are more than any chain of calls takes: nothing calls itself."""
     gcc = require_program("gcc")
     thing = networks()[1] if name == "network" else body(name)
     done = export_c(thing, tmp_path, check=False, single=single)
-    options = (level, "-c", "-fstack-usage", str(done.sources[0]), "-o", str(tmp_path / "all.o"))
+    options = ("-O2", "-c", "-fstack-usage", str(done.sources[0]), "-o", str(tmp_path / "all.o"))
     subprocess.run([gcc, *options], check=True)
     rows = [line.split("\t") for line in (tmp_path / "all.su").read_text("utf-8").splitlines()]
     assert {kind for *_, kind in rows} == {"static"}
@@ -353,7 +352,7 @@ def test_the_header_says_how_long_an_answer_takes_and_how_precise_it_is(tmp_path
         export_c(thing, tmp_path / str(single), check=False, single=single).files[0].read_text("utf-8")
         for single in (False, True)
     ]
-    assert "exported with --float they are of single" in texts[0]
+    assert "exported with --float they are single" in texts[0]
     assert "Numbers are of single precision" in texts[1]
     for text in texts:
         answer, deviation = map(float, re.findall(r"([\d.]+) thousand", text))

@@ -184,7 +184,7 @@ def _costs(facts: _Facts) -> list[str]:
         f"answer takes about {answer} thousand operations, a deviation {deviation} thousand more.",
         "Numbers are of single precision (--float): force and energy differ by about 1e-6 of the largest."
         if facts.single
-        else "Numbers are of double precision; exported with --float they are of single, and most tables half as large.",
+        else "Numbers are of double precision; exported with --float they are single, and most tables half as large.",
         "All files are C99, and C++17 too.",
     ]
 
@@ -203,12 +203,12 @@ def _operations(facts: _Facts) -> int:
     units = tables[NET + 3].values.size // (entries + rows + pairs + outputs)
     count = units * (4 * entries + 2 * rows + _RADIAL + 4 * pairs + 4 * min(n, 3) + 2 * outputs)
     count += 3 * tables[POINTS].values.size if POINTS in tables else 0
-    return count + (_SURFACE if facts.felt == 3 else 0)
+    return int(count) + (_SURFACE if facts.felt == 3 else 0)
 
 
 def _deviation_operations(facts: _Facts) -> int:
     """Return about how many operations a deviation takes beside its answer: four lines of the root."""
-    return 8 * facts.block.tables[ROOT].values.size if ROOT in facts.block.tables else 0
+    return 8 * int(facts.block.tables[ROOT].values.size) if ROOT in facts.block.tables else 0
 
 
 def _thousands(count: int) -> str:

@@ -75,3 +75,36 @@ def test_a_body_too_stiff_for_its_device_is_softened_and_that_is_told(palpate, t
     answer = palpate("run", stiff, "--seconds", "0.2", "--rate", "200", "--device", device, "--unsoftened")
     assert "as asked" in answer.err
     assert "energy    never below" in answer.out
+
+
+SERVICES = [("haply", ("--port", "0", "--events", "0"), 0.10), ("crtk", ("--port", "0"), 0.05)]
+
+
+@pytest.mark.parametrize(("device", "options", "radius"), SERVICES, ids=["haply", "crtk"])
+@pytest.mark.parametrize("given", [True, False], ids=["for the body", "by default"])
+def test_the_double_of_a_service_strokes_within_the_training(palpate, file, device, options, radius, given):
+    body = touchable(slab.surrogate())
+    words = ("--body", file) if given else ()
+    answer = palpate("devices", "simulate", device, *options, *words, "--seconds", "0.1", "--json")
+    assert answer.code == 0, answer.err
+    depth = json.loads(answer.out)["amplitude"] * body.workspace(radius).scale
+    assert 0.0 < depth < body.deepest
+    assert not given or depth == pytest.approx(0.75 * body.deepest)
+
+
+@pytest.mark.parametrize("device", ["forcedimension", "openhaptics"])
+@pytest.mark.parametrize("given", [True, False], ids=["for the body", "by default"])
+def test_the_first_trial_of_a_compiled_double_stays_within_the_training(
+    palpate, c_compiler, file, tmp_path, device, given
+):
+    """As the guides have it: compile the double, then run with what it says."""
+    words = ("--body", file) if given else ()
+    double = palpate(
+        "devices", "simulate", device, "--folder", tmp_path, "--frequency", "1", *words, "--json"
+    )
+    assert double.code == 0, double.err
+    answer = palpate("run", file, "--seconds", "1.5", "--device", json.loads(double.out)["device"], "--json")
+    assert answer.code == 0, answer.err
+    told = json.loads(answer.out)
+    assert 0.0 < told["largest_depth"] < touchable(slab.surrogate()).deepest
+    assert told["outside"] == told["let_go"] == 0.0

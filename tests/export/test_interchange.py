@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 import re
@@ -20,12 +21,14 @@ import xarray as xr
 
 import palpate
 from bent import body as bent_body
+from exported_bodies import body as held_body
 from palpate.cli.drawn_stroke import reservations_about, stroke_of
 from palpate.dataset.dataset_tables import write_fields_csv, write_table
 from palpate.errors import UsageError
 from palpate.export.gltf import ShapeSeries, write_glb
 from palpate.export.shape_files import series_of_dataset, series_of_surrogate, write_shapes
 from palpate.learning import Fitted
+from palpate.network import TrainedRegion
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
 from palpate.surrogates.model_card import NOT_STATED, card_of
@@ -231,6 +234,41 @@ def test_a_stroke_touches_where_it_is_told_to_and_along_the_normal():
         with pytest.raises(UsageError) as error:
             stroke_of(body, 4, at=at, depth=depth)
         assert re.search(said, str(error.value) + str(error.value.fix))
+
+
+def trained_at(low, high):
+    """The slab, trained within a box of its scaled inputs alone: 12 mm deep at −1, in the air at 1."""
+    energy = touch_energy()
+    points = np.random.default_rng(0).uniform(low, high, (200, 3))
+    return Surrogate(
+        dataclasses.replace(energy, region=TrainedRegion.of(points)),
+        {"displacement": field()},
+        meta={"name": "slab"},
+    )
+
+
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [([-1, -1, -1], [1, 1, 1]), ([-0.3, -0.3, -0.2], [0.3, 0.3, 1.0]), ([0.4, 0.4, -1.0], [1.0, 1.0, 1.0])],
+    ids=["throughout", "not so deep", "not in the middle"],
+)
+def test_the_stroke_by_default_lies_within_what_was_trained(low, high):
+    body = trained_at(low, high)
+    X = stroke_of(body, 8)
+    assert body.energy.inside(X).all()
+    assert reservations_about(body, X) == []
+    depth = body.energy.depth(X)
+    assert (np.diff(depth) > 0.0).all()
+    assert depth[-1] > 0.25 * touchable(body).deepest
+
+
+@pytest.mark.parametrize("name", ["pad", "constant", "iwan"])
+def test_the_pull_by_default_lies_within_what_was_trained(name):
+    """The farthest corner of the ranges is farther than any axis goes."""
+    thing = held_body(name)
+    X = stroke_of(thing, 8)
+    assert thing.energy.inside(X).all()
+    assert np.ptp(X[:, : len(thing.energy.baseline.directions)], axis=0).max() > 0.0
 
 
 def test_what_can_not_go_out_is_refused(block, tmp_path):

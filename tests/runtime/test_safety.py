@@ -161,12 +161,90 @@ def seen(check, places, time=0.0):
             [False, False, False, True, False, False],
         ),  # then it is the place
         ([0.2, 0.2, 0.2, 0.2], [False, False, True, True]),  # out of reach from the start
-        ([0.0, 0.2, 0.2, 0.2, 0.2, 0.0, 0.0], [False] * 3 + [True] * 3 + [False]),
+        (
+            [0.0, *[0.2] * 4, *[0.0] * 14],
+            [False] * 3 + [True] * 12 + [False] * 4,
+        ),  # the count leaks by a tenth
     ],
     ids=["fast", "sparks", "two", "leap", "far", "far and back"],
 )
 def test_places_that_cannot_be_are_doubted_and_then_a_fault(places, faults):
     assert [fault for _, fault in seen(PlaceCheck(0.15, 5.0, PERIOD), places)] == faults
+
+
+def in_three_axes(x):
+    """Places (N, 3), m, that move as x (N,) along a direction of no axis."""
+    return np.outer(x, [0.48, 0.6, 0.64])
+
+
+def checked(places, period, times=None, **traits):
+    """Samples that were doubted, and the first ones with a fault, of places (N, 3) that come every `period`, s."""
+    check, doubted, faults = PlaceCheck(0.15, 5.0, PERIOD, **traits), [], []
+    for k, place in enumerate(places):
+        check.see(*place.tolist(), k * period if times is None else times[k], k * period)
+        doubted += [k] if check.doubts else []
+        faults += [k] if check.fault else []
+    return doubted, faults
+
+
+def fast_hand(times):
+    """A hand that shakes as fast as a hand can: 5 cm at 6 Hz, 71 m/s² and 1.9 m/s."""
+    return in_three_axes(0.05 * np.sin(2.0 * math.pi * 6.0 * times))
+
+
+@pytest.mark.parametrize("period", [1e-3, 5e-3], ids=["1 kHz", "200 Hz"])
+@pytest.mark.parametrize("stroke", [0.004, 0.02], ids=["4 mm", "2 cm"])
+@pytest.mark.parametrize("moving", [0.0, 1.0], ids=["held still", "moving"])
+def test_places_to_and_fro_are_a_fault_that_stays(period, stroke, moving):
+    """The handle would have to turn at once; a count of doubts in a row begins anew at each good sample."""
+    noise = np.random.default_rng(3).normal(0.0, 1e-4, (200, 3))
+    places = noise + moving * fast_hand(period * np.arange(200)) / 5.0
+    places[1::2] += in_three_axes([stroke])
+    _, faults = checked(places, period)
+    assert faults[0] < 12
+    assert faults == list(range(faults[0], 200))
+
+
+@pytest.mark.parametrize("period", [1e-3, 5e-3], ids=["1 kHz", "200 Hz"])
+def test_a_glitch_in_eleven_samples_is_passed_over_for_ever_and_one_in_five_is_a_fault(period):
+    for every, bad in ((11, False), (50, False), (5, True)):
+        places = fast_hand(period * np.arange(5000)) / 5.0
+        glitches = np.arange(7, 5000, every)
+        places[glitches] += in_three_axes(np.where(glitches % 2, 0.05, -0.02))
+        doubted, faults = checked(places, period)
+        assert set(glitches) <= set(doubted)
+        assert bool(faults) == bad
+
+
+@pytest.mark.parametrize("period", [1e-3, 5e-3], ids=["1 kHz", "200 Hz"])
+@pytest.mark.parametrize("sensor", ["true", "noise of 0.3 mm", "steps of 0.1 mm", "late by up to 0.2 ms"])
+def test_fast_hands_and_the_noise_of_sensors_are_no_fault(period, sensor):
+    times = period * np.arange(10000)
+    rng = np.random.default_rng(4)
+    if sensor.startswith("late"):
+        times = times - rng.uniform(0.0, 2e-4, 10000)
+    places = fast_hand(times)
+    if sensor.startswith("noise"):
+        places = places + rng.normal(0.0, 3e-4, (10000, 3))
+    if sensor.startswith("steps"):
+        places = np.round(places / 1e-4) * 1e-4
+    doubted, faults = checked(places, period)
+    assert not faults
+    assert len(doubted) <= 10, "one in a thousand"
+
+
+@pytest.mark.parametrize("period", [1e-3, 5e-3], ids=["1 kHz", "200 Hz"])
+def test_a_handle_that_hits_its_end_stop_is_doubted_once_and_followed(period):
+    places = in_three_axes(np.minimum(4.0 * period * np.arange(60), 0.1))  # 4 m/s, and then none
+    doubted, faults = checked(places, period)
+    assert len(doubted) == 1
+    assert not faults
+
+
+def test_a_sensor_of_more_noise_is_granted_what_it_states():
+    places = np.random.default_rng(5).normal(0.0, 1e-3, (3000, 3))
+    assert checked(places, PERIOD)[1]
+    assert not checked(places, PERIOD, noise=1e-3)[1]
 
 
 def test_doubts_end_in_a_fault_after_15_ms_also_of_a_slow_source():

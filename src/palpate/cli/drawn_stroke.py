@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from palpate.units import bounds, parse_quantity
 __all__ = ["reservations_about", "stroke_of"]
 
 _ROUNDING = 1e-9  # of a depth
+_TRIED = 8  # places
 
 
 def stroke_of(body: Surrogate, steps: int, at: str | None = None, depth: float | None = None) -> np.ndarray:
@@ -29,9 +32,10 @@ def stroke_of(body: Surrogate, steps: int, at: str | None = None, depth: float |
         Number of states.
     at : str, optional
         x,y,z in m: the place of contact on the surface of a pressed body, where the probe goes in against the normal;
-        the displacement in the end of a held one. By default the middle of what was trained.
+        the displacement in the end of a held one. By default the middle of what was trained; elsewhere where the middle
+        was not trained.
     depth : float, optional
-        Largest depth in m; by default the deepest trained one.
+        Largest depth in m; by default the deepest down to which all states are of the trained region.
 
     Raises
     ------
@@ -59,15 +63,60 @@ def stroke_of(body: Surrogate, steps: int, at: str | None = None, depth: float |
         low, high = bounds(shown.inputs)  # type: ignore[union-attr]  # it has a field of nodes; from no load to all
         return np.asarray(shares[:, None] * np.where(np.abs(high) >= np.abs(low), high, low))
     hand = touchable(body)
-    low, high = bounds(body.inputs)
-    far = hand.deepest if depth is None else depth
-    if hand.surface is not None:
-        places = _press(hand, hand.surface, given, far * shares)
-    else:
-        whole = given if given is not None else np.array([0.0, 0.0, far])[: len(low)]
-        places = shares[:, None] * whole
-    rest = np.tile((low + high)[None, places.shape[1] :] / 2, (steps, 1))
+
+    def stroke(place: np.ndarray | None, far: float) -> np.ndarray:
+        if hand.surface is None:
+            return _pull(hand, place, far * shares)
+        return _with_middles(hand, _press(hand, hand.surface, place, far * shares))
+
+    if depth is not None or (given is not None and hand.surface is None):
+        return stroke(given, hand.deepest if depth is None else depth)
+    places = [given] if given is not None or hand.surface is None else [None, *_trained_places(hand)]
+    strokes = [_trained_part(hand, partial(stroke, place)) for place in places]
+    deepest = [float(hand.depth(X[-1:])[0]) if hand.energy.inside(X).all() else 0.0 for X in strokes]
+    # the middle, unless another place was trained twice as deep
+    return strokes[0] if deepest[0] >= 0.5 * max(deepest) else strokes[int(np.argmax(deepest))]
+
+
+def _with_middles(hand: Touchable, places: np.ndarray) -> np.ndarray:
+    """Return places (k, felt) with the further inputs in the middle of their ranges, (k, n)."""
+    low, high = bounds(hand.inputs)
+    rest = np.tile((low + high)[None, places.shape[1] :] / 2, (len(places), 1))
     return np.hstack([places, rest])
+
+
+def _pull(hand: Touchable, given: np.ndarray | None, ways: np.ndarray) -> np.ndarray:
+    """Return the inputs (k, n) of what is held, on its way to a place; by default ways (k,), m, along its last axis."""
+    felt = len(hand.inputs) - len(hand.parameters)
+    if given is not None:
+        return _with_middles(hand, ways[:, None] / ways[-1] * given[:felt])
+    last = hand.inputs[felt - 1]
+    end = last.high if last.high >= -last.low else last.low
+    along = ways * min(1.0, abs(end) / ways[-1]) * np.sign(end)
+    return _with_middles(hand, along[:, None] * np.eye(felt)[-1])
+
+
+def _trained_part(hand: Touchable, stroke: Callable[[float], np.ndarray]) -> np.ndarray:
+    """Return the stroke down to the deepest place above which all is trained; the whole one where nothing is."""
+    far = hand.deepest
+    whole = X = stroke(far)
+    while not (inside := hand.energy.inside(X)).all():
+        known = int(np.argmin(inside))  # states before the first that isn't
+        if known == 0:
+            return whole
+        far *= known / len(X)
+        X = stroke(far)
+    return X
+
+
+def _trained_places(hand: Touchable) -> list[np.ndarray]:
+    """Return places of contact (3,) under the deepest trained presses, for where nothing is trained in the middle."""
+    assert hand.surface is not None
+    X = hand.trained_inputs
+    X = X[hand.depth(X) <= hand.deepest * (1.0 + _ROUNDING)]
+    X = X[np.argsort(-hand.depth(X))[:_TRIED]]
+    distance, slope, _ = hand.surface.at(X[:, :3])
+    return list(X[:, :3] - distance[:, None] * slope / np.linalg.norm(slope, axis=1)[:, None])
 
 
 def _press(

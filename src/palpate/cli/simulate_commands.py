@@ -25,11 +25,23 @@ simulate_app = typer.Typer(
 )
 
 Amplitude = Annotated[
-    float,
+    float | None,
     number_option(
-        "--amplitude", "m", least=-0.1, most=0.1, help="Stroke of the simulated hand, m; downwards first."
+        "--amplitude",
+        "m",
+        least=-0.1,
+        most=0.1,
+        help="Stroke of the simulated hand, m; downwards first. Default: what presses the body of --body to three "
+        "quarters of its trained depth, else 8 % of the device's radius.",
     ),
 ]
+Body = Annotated[
+    Path | None,
+    typer.Option("--body", help="File of the learnt body that is to be pressed.", show_default=False),
+]
+# of a workspace's radius: on a body that is held; a tenth of the reach of one that is pressed
+_HELD, _SHORT = 0.3, 0.08
+_TOUCH_BOX = 0.035  # m, half of the shortest side of the workspace that the double of OpenHaptics states
 Frequency = Annotated[
     float, number_option("--frequency", "Hz", least=0.0, most=5.0, help="Strokes per second, Hz.")
 ]
@@ -47,7 +59,8 @@ def haply(
     events: Annotated[
         int, count_option("--events", least=0, most=65535, help="Port of the event channel.")
     ] = 10020,
-    amplitude: Amplitude = 0.03,
+    body: Body = None,
+    amplitude: Amplitude = None,
     frequency: Frequency = 0.5,
     spelling: Annotated[
         str, typer.Option(help="Spelling of a force that is understood: both, vector or values.")
@@ -72,6 +85,7 @@ def haply(
 ) -> None:
     """Run a double of the Haply Inverse Service, until Ctrl-C."""
     from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
+    from palpate.runtime.devices.profiles import PROFILES, weakest_profile
 
     settings = SimulatorSettings(
         port=port,
@@ -81,14 +95,15 @@ def haply(
         force_scale=force_scale,
         kind=kind,
         grip=grip,
-        amplitude=amplitude,
+        amplitude=_stroke(amplitude, body, PROFILES.get(kind, weakest_profile("haply")).radius),
         frequency=frequency,
     )
     with HaplySimulator(settings) as service:
         device = f"haply:ws://localhost:{service.port},events={service.events_port}"
         console = _listen(f"A simulated Haply {kind} listens.", device, seconds, as_json)
     console.result(
-        f"{service.received} commands were answered.", {"device": device, "commands": service.received}
+        f"{service.received} commands were answered.",
+        {"device": device, "commands": service.received, "amplitude": settings.amplitude},
     )
 
 
@@ -102,22 +117,30 @@ def crtk(
     ros: Annotated[
         int, count_option("--ros", least=1, most=2, help="Version of ROS, whose types are understood.")
     ] = 2,
-    amplitude: Amplitude = 0.03,
+    body: Body = None,
+    amplitude: Amplitude = None,
     frequency: Frequency = 0.5,
     seconds: Seconds = 86400.0,
     as_json: Json = False,
 ) -> None:
     """Run a double of a CRTK arm behind a ROS bridge, until Ctrl-C."""
+    from palpate.runtime.devices.crtk import CrtkSettings
     from palpate.runtime.devices.crtk_simulator import CrtkSimulator, CrtkSimulatorSettings
 
     settings = CrtkSimulatorSettings(
-        port=port, arm=arm, rate=rate, ros=ros, amplitude=amplitude, frequency=frequency
+        port=port,
+        arm=arm,
+        rate=rate,
+        ros=ros,
+        amplitude=_stroke(amplitude, body, CrtkSettings().radius),
+        frequency=frequency,
     )
     with CrtkSimulator(settings) as service:
         device = f"crtk:ws://localhost:{service.port},arm={arm}"
         console = _listen("A simulated CRTK arm moves.", device, seconds, as_json)
     console.result(
-        f"{service.wrenches} wrenches were taken.", {"device": device, "wrenches": service.wrenches}
+        f"{service.wrenches} wrenches were taken.",
+        {"device": device, "wrenches": service.wrenches, "amplitude": settings.amplitude},
     )
 
 
@@ -127,7 +150,8 @@ def forcedimension(
     kind: Annotated[
         str, typer.Option("--type", help="Type of the device, such as omega.3, delta.6, sigma.7 or falcon.")
     ] = "omega.3",
-    amplitude: Amplitude = 0.03,
+    body: Body = None,
+    amplitude: Amplitude = None,
     frequency: Frequency = 0.5,
     homed: Annotated[bool, typer.Option(help="Whether the device has been homed.")] = True,
     lost_after: Annotated[
@@ -141,13 +165,15 @@ def forcedimension(
     """Compile a double of Force Dimension's library, with a device behind it."""
     from palpate.errors import UsageError
     from palpate.runtime.devices.force_dimension import TYPES
+    from palpate.runtime.devices.profiles import device_profile
 
     numbers = {name: number for number, name in reversed(TYPES.items())}
     if kind not in numbers:
         raise UsageError(
             f"There is no simulated {kind!r}.", fix=f"Choose one of {', '.join(sorted(numbers))}."
         )
-    definitions = {"TYPE": numbers[kind], "AMPLITUDE": amplitude, "FREQUENCY": frequency}
+    stroke = _stroke(amplitude, body, device_profile(kind).radius)
+    definitions = {"TYPE": numbers[kind], "AMPLITUDE": stroke, "FREQUENCY": frequency}
     _compile("forcedimension", folder, definitions | {"HOMED": homed, "LOST_AFTER": lost_after}, as_json)
 
 
@@ -157,7 +183,8 @@ def openhaptics(
     kind: Annotated[
         str, typer.Option("--type", help="Type of the device: touch, touchx, desktop or omni.")
     ] = "touch",
-    amplitude: Amplitude = 0.03,
+    body: Body = None,
+    amplitude: Amplitude = None,
     frequency: Frequency = 0.5,
     lost_after: Annotated[
         int,
@@ -179,10 +206,23 @@ def openhaptics(
     kinds = ("touch", "touchx", "desktop", "omni")  # in the order of the double's models
     if kind not in kinds:
         raise UsageError(f"There is no simulated {kind!r}.", fix=f"Choose one of {', '.join(kinds)}.")
-    definitions = {"MODEL": kinds.index(kind), "AMPLITUDE": amplitude, "FREQUENCY": frequency}
+    stroke = _stroke(amplitude, body, _TOUCH_BOX)
+    definitions = {"MODEL": kinds.index(kind), "AMPLITUDE": stroke, "FREQUENCY": frequency}
     _compile(
         "openhaptics", folder, definitions | {"LOST_AFTER": lost_after, "WARM_EVERY": warm_every}, as_json
     )
+
+
+def _stroke(amplitude: float | None, body: Path | None, radius: float) -> float:
+    """Return the stroke of a double's hand, m, in the workspace of its device, whose radius is given, m."""
+    from palpate.runtime.touchable import load_touchable
+
+    if amplitude is not None:
+        return amplitude
+    if body is None:
+        return _SHORT * radius
+    touch = load_touchable(body)
+    return touch.stroke(touch.workspace(radius).scale).get("amplitude", _HELD * radius)
 
 
 def _listen(words: str, device: str, seconds: float, as_json: bool) -> Console:
@@ -201,4 +241,6 @@ def _compile(device: str, folder: Path, definitions: dict[str, float], as_json: 
     library = compile_double(device, folder, {name: float(value) for name, value in definitions.items()})
     use = f"{device}:library={library}"
     text = f"The library of a simulated device is {library}. Next: palpate run MODEL --device {use}"
-    Console(as_json).result(text, {"device": use, "library": str(library)})
+    Console(as_json).result(
+        text, {"device": use, "library": str(library), "amplitude": definitions["AMPLITUDE"]}
+    )

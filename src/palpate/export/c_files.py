@@ -28,7 +28,7 @@ from palpate.export.c_templates import (
     RELEASE_CODE,
 )
 from palpate.export.core_source import core_source
-from palpate.export.weights_block import ARRAYS, FIELD, NET, ROOT, Table, WeightsBlock
+from palpate.export.weights_block import ARRAYS, FIELD, NET, POINTS, ROOT, Table, WeightsBlock
 from palpate.network import Network
 from palpate.surrogates import Surrogate
 from palpate.units import Quantity, Range
@@ -36,6 +36,11 @@ from palpate.units import Quantity, Range
 __all__ = ["body_sizes", "c_files", "require_name"]
 
 _WIDTH = 118
+_STACK = {
+    False: 12_000,
+    True: 8_000,
+}  # bytes of all frames of the core together, of double and single precision
+_RADIAL, _SURFACE = 40, 8000  # operations of a radial function; of five distances to a curved surface
 _KEYWORDS = frozenset(
     "auto break case char const continue default do double else enum extern float for goto if inline int long "  # noqa: SIM905
     "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile "
@@ -165,9 +170,49 @@ def _head(facts: _Facts, further: list[str]) -> str:
         "",
         "All quantities are in SI units. No function allocates memory, writes to a variable of its own, or reads or",
         "prints anything: any number of threads may call them. Do not compile with options such as -ffast-math.",
+        *_costs(facts),
         f"SHA-256 of the weights: {facts.block.hash}",
     ]
     return _comment(lines)
+
+
+def _costs(facts: _Facts) -> list[str]:
+    """Return what calls cost, and how precise their numbers are, in words."""
+    answer, deviation = _thousands(_operations(facts)), _thousands(_deviation_operations(facts))
+    return [
+        f"Stack: less than {_stack_bytes(facts) / 1e3:.0f} kB with -O2. Time: no loop's length depends on a place; an",
+        f"answer takes about {answer} thousand operations, a deviation {deviation} thousand more.",
+        "Numbers are of single precision (--float): force and energy differ by about 1e-6 of the largest."
+        if facts.single
+        else "Numbers are of double precision; exported with --float they are single, and most tables half as large.",
+        "All files are C99, and C++17 too.",
+    ]
+
+
+def _stack_bytes(facts: _Facts) -> int:
+    """Return a bound of the stack, bytes: frames of the core, and the rows that a network alone keeps on it."""
+    size, latent = (4 if facts.single else 8), int(facts.block.tables[NET].values[4])
+    rows = latent * (1 + len(facts.inputs)) + len(facts.outputs) if facts.outputs else 0
+    return _STACK[facts.single] + size * rows
+
+
+def _operations(facts: _Facts) -> int:
+    """Return about how many sums and products an answer takes: of the units, the trained points, the surface."""
+    tables = facts.block.tables
+    n, entries, rows, _, outputs, _, pairs = tables[NET].values.tolist()[:7]
+    units = tables[NET + 3].values.size // (entries + rows + pairs + outputs)
+    count = units * (4 * entries + 2 * rows + _RADIAL + 4 * pairs + 4 * min(n, 3) + 2 * outputs)
+    count += 3 * tables[POINTS].values.size if POINTS in tables else 0
+    return int(count) + (_SURFACE if facts.felt == 3 else 0)
+
+
+def _deviation_operations(facts: _Facts) -> int:
+    """Return about how many operations a deviation takes beside its answer: four lines of the root."""
+    return 8 * int(facts.block.tables[ROOT].values.size) if ROOT in facts.block.tables else 0
+
+
+def _thousands(count: int) -> str:
+    return f"{count / 1e3:.2g}" if count < 1e5 else f"{count / 1e3:.0f}"
 
 
 def _body_header(facts: _Facts, surrogate: Surrogate) -> str:

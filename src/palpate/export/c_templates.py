@@ -40,7 +40,8 @@ BODY_API = """
 /* flags that most functions return, added up */
 #define NAME_CONTACT 1      /* the probe touches the body, or the body is held */
 #define NAME_TRUSTED 2      /* inside the trained region; without contact the answer is exact and counts as inside */
-#define NAME_NOT_A_NUMBER 4 /* an input was not finite, and so is every answer */
+#define NAME_NOT_A_NUMBER 4 /* an input was no finite number, or so large that an answer is none: the force and its */
+                            /* derivative are zero, all else is not-a-number */
 #define NAME_TOO_DEEP 8     /* so far inside that the body should let go of the probe: take its force for zero */
 
 /* the energy U that the hand has given, J */
@@ -80,7 +81,7 @@ typedef struct {
 void NAME_start(NAME_state *state);
 
 /* Move the hand to a place within dt seconds and fill the force (3) that the body with its memory answers, N. Where an
- * input is not finite nothing changes, the force is not-a-number, and the flags say so. */
+ * input is not finite nothing changes, the force is zero, and the flags say so. */
 int32_t NAME_step(NAME_state *state, const NAME_real *x, const NAME_real *p, NAME_real dt, NAME_real *force);
 """
 RELEASE_API = """
@@ -169,13 +170,9 @@ void NAME_start(NAME_state *state) { memset(state, 0, sizeof *state); }
 
 int32_t NAME_step(NAME_state *state, const NAME_real *x, const NAME_real *p, NAME_real dt, NAME_real *force) {
   pp_real answer[PP_ANSWER];
-  int32_t flags = pp_answer(&NAME_model, x, p, answer);
-  int i;
-  if (!@LAW@_step(&NAME_model, state->numbers, x, answer[PP_AMPLITUDE], answer + PP_SLOPE, dt, force)) {
-    flags |= PP_NOT_A_NUMBER;
-    for (i = 0; i < 3; i++) force[i] = pp_nan();
-  }
-  return flags;
+  const int32_t flags = pp_answer(&NAME_model, x, p, answer);
+  if (@LAW@_step(&NAME_model, state->numbers, x, answer[PP_AMPLITUDE], answer + PP_SLOPE, dt, force)) return flags;
+  return flags | PP_NOT_A_NUMBER; /* and the force is zero */
 }
 """
 RELEASE_CODE = """

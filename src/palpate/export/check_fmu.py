@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -13,7 +14,7 @@ from palpate.export.check_points import ANSWERS, CONTACT, NOT_A_NUMBER, TOO_DEEP
 
 __all__ = ["CheckFmu", "FmuInstance", "open_instance"]
 
-_PLACE, _OUTPUTS, _PARAMETERS = [0, 1, 2], [6, 7, 3, 4, 5], range(16, 64)
+_PLACE, _OUTPUTS, _PARAMETERS = [0, 1, 2], [6, 7, 3, 4, 5], range(16, 48)
 
 
 class FmuInstance(Protocol):
@@ -44,7 +45,13 @@ class FmuInstance(Protocol):
         """End it."""
 
 
-def open_instance(description: Any, folder: str, *, exchange: bool = False) -> FmuInstance:
+def open_instance(
+    description: Any,
+    folder: str,
+    *,
+    exchange: bool = False,
+    log: Callable[..., None] = lambda *_: None,
+) -> FmuInstance:
     """Return an instance of an FMU.
 
     Parameters
@@ -55,9 +62,11 @@ def open_instance(description: Any, folder: str, *, exchange: bool = False) -> F
         Where it is unpacked.
     exchange : bool
         Whether in model exchange.
+    log : function
+        Takes what the FMU logs; by default nothing is done: warnings of places outside are what is asked for here.
     """
     kind = _Instance2 if description.fmiVersion == "2.0" else _Instance3
-    return kind(description, folder, exchange=exchange)
+    return kind(description, folder, log, exchange=exchange)
 
 
 class _Instance:
@@ -79,7 +88,7 @@ class _Instance:
 class _Instance2(_Instance):
     """An instance of FMI 2.0, see `FmuInstance`."""
 
-    def __init__(self, description: Any, folder: str, *, exchange: bool) -> None:
+    def __init__(self, description: Any, folder: str, log: Callable[..., None], *, exchange: bool) -> None:
         from fmpy.fmi2 import (
             FMU2Model,
             FMU2Slave,
@@ -88,9 +97,8 @@ class _Instance2(_Instance):
             fmi2CallbackLoggerTYPE,
         )
 
-        # warnings of places outside are what is asked for here: nothing is printed
         self._calls = fmi2CallbackFunctions()
-        self._calls.logger = fmi2CallbackLoggerTYPE(lambda *_: None)
+        self._calls.logger = fmi2CallbackLoggerTYPE(log)
         self._calls.allocateMemory = defaultCallbacks.allocateMemory
         self._calls.freeMemory = defaultCallbacks.freeMemory
         self.fmu = (FMU2Model if exchange else FMU2Slave)(**_identity(description, folder, exchange=exchange))
@@ -116,11 +124,11 @@ class _Instance2(_Instance):
 class _Instance3(_Instance):
     """An instance of FMI 3.0, see `FmuInstance`."""
 
-    def __init__(self, description: Any, folder: str, *, exchange: bool) -> None:
+    def __init__(self, description: Any, folder: str, log: Callable[..., None], *, exchange: bool) -> None:
         from fmpy.fmi3 import FMU3Model, FMU3Slave
 
         self.fmu = (FMU3Model if exchange else FMU3Slave)(**_identity(description, folder, exchange=exchange))
-        self.fmu.instantiate(logMessage=lambda *_: None)
+        self.fmu.instantiate(logMessage=log)
 
     def begin(self, *, again: bool = True) -> None:
         if again:
@@ -214,7 +222,7 @@ class CheckFmu:
                     row[[5 + i, 8 + i, 11 + i]] = asked.slopes([3, 4, 5], _PLACE, seed)
             row[19] = asked.read([8])[0]
             inside, contact, deep = asked.flags()
-            finite = all(map(np.isfinite, x))
+            finite = np.isfinite(row[0])
             row[20] = TRUSTED * inside + CONTACT * contact + TOO_DEEP * deep if finite else NOT_A_NUMBER
         return rows
 

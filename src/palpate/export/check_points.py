@@ -279,8 +279,8 @@ def true_answers(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
             evaluate.stiffness.ravel(),
         )
         row[14], row[15], row[16:19] = row[0] + numbers.offset, evaluate.amplitude, evaluate.slope
-        if not np.isfinite(x).all():
-            row[20] = NOT_A_NUMBER
+        if not np.isfinite(row[:19]).all():  # an export pushes nobody with what is no number
+            row[2:14], row[20] = 0.0, NOT_A_NUMBER
             continue
         touching = numbers.holds or row[1] > 0
         own = numbers.radius_input

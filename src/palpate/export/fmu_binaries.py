@@ -26,11 +26,12 @@ __all__ = ["build_binaries", "built_binaries", "fmu_source", "main"]
 
 _SOURCES = ("memory_states.c", "fmi_instance.c", "fmi_body.c", "fmi_derivatives.c", "fmi2.c", "fmi3.c")
 # small code for macOS: both machines' parts stand in one file of FMI 2.0, which is to be less than 200 kB
+_SMALL = ("-Os", "-Wl,-headerpad,0x100")  # room in the head for a signature, and not a page of it
 TARGETS: Mapping[str, tuple[str, ...]] = {
     "x86_64-linux/.so": ("-target", "x86_64-linux-gnu.2.17", "-O2"),
     "x86_64-windows/.dll": ("-target", "x86_64-windows-gnu", "-O2"),
-    "x86_64-darwin/.dylib": ("-target", "x86_64-macos.11.0", "-Os"),
-    "aarch64-darwin/.dylib": ("-target", "aarch64-macos.11.0", "-Os"),
+    "x86_64-darwin/.dylib": ("-target", "x86_64-macos.11.0", *_SMALL),
+    "aarch64-darwin/.dylib": ("-target", "aarch64-macos.11.0", *_SMALL),
 }
 """What is built: folder in an FMU of FMI 3.0 and ending, and the compiler's options."""
 _FOLDERS2 = {"linux64/.so": "x86_64-linux/.so", "win64/.dll": "x86_64-windows/.dll"}

@@ -16,6 +16,7 @@ from palpate.units import bounds
 __all__ = ["Variable", "body_variables", "defined_units", "has_exchange"]
 
 PARAMETER, STATE, FLAGS, SCALE = 16, 64, 12, 9  # value references, as in core/fmi_instance.c
+DAMPING, MASS, LIGHT = 48, 49, 0.05  # the last is the start of MASS, kg: a light tool
 _MOST_STATES = 2000  # solvers keep a square matrix of them, and each is described by two variables
 _PLACES = (0, 1, 2)
 _UNITS: Mapping[str, str] = {
@@ -25,6 +26,8 @@ _UNITS: Mapping[str, str] = {
     "W": 'kg="1" m="2" s="-3"',
     "Pa": 'kg="1" m="-1" s="-2"',
     "N/m": 'kg="1" s="-2"',
+    "N.s/m": 'kg="1" s="-1"',
+    "kg": 'kg="1"',
     "s": 's="1"',
     "1": "",
 }
@@ -115,7 +118,27 @@ def _parameters(surrogate: Surrogate) -> list[Variable]:
     scale = Variable(
         "force_scale", "factor of forces and energies", SCALE, "parameter", "tunable", "1", start=1.0
     )
-    return [scale] + [
+    damping = Variable(
+        "damping",
+        "damping of the hand within a contact, by its velocity from step to step; of co-simulation alone",
+        DAMPING,
+        "parameter",
+        "tunable",
+        "N.s/m",
+        start=0.0,
+        low=0.0,
+    )
+    mass = Variable(
+        "mass",
+        "mass that the force moves, by which steps are judged to be too long; 0 for no warning",
+        MASS,
+        "parameter",
+        "tunable",
+        "kg",
+        start=LIGHT,
+        low=0.0,
+    )
+    return [scale, damping, mass] + [
         Variable(
             identifier(r.name),
             r.name,

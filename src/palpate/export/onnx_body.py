@@ -72,22 +72,28 @@ def add_body(graph: Graph, energy: LearntEnergy) -> None:
     X = graph.where(finite, given, np.zeros((1, n)))
     place = X.columns(0, k) if k == 3 else X.columns(0, k) @ D
 
+    graph.stage = "surface"
     touch = _touch(graph, energy, X, place) if isinstance(baseline, ContactBaseline) else None
     asked = place if touch is None else place + touch.excess * touch.normal
+    graph.stage = "ranges"
     felt = asked if k == 3 else asked @ D.T
     line = felt if n == k else graph.join(felt, X.columns(k, n))
     saturated, slope, curvature = _box(graph, energy, line)
     centre, half = net.scaling.input_centre, net.scaling.input_half
     xi = (saturated - centre) / half
 
+    graph.stage = "network"
     slopes = network_slopes(graph, net, xi, k)
+    graph.stage = "baseline"
     known = _known(graph, energy, place, touch, xi)
     if isinstance(baseline, PadBaseline):
         slopes = _with_polynomial(graph, baseline, xi, half, slopes, k)
+    graph.stage = "slopes"
     slopes = _through_box(slopes, slope.columns(0, k), curvature.columns(0, k), k)
     slopes = _to_space(slopes, D)
     if touch is not None and math.isfinite(energy.going.deepest):
         slopes = _leave(graph, baseline, touch, slopes, place)
+    graph.stage = "answers"
     _answers(graph, energy, known, touch, slopes, (given, X, place), finite)
 
 
@@ -143,7 +149,7 @@ def _known(graph: Graph, energy: LearntEnergy, place: Value, touch: _Touch | Non
     if isinstance(baseline, ConstantBaseline):
         zero = place * 0.0
         level = place.columns(0, 1) * 0.0 + baseline.level
-        return _Known(level, zero, zero.reshape(-1, 3, 1) * zero.reshape(-1, 1, 3), level * 0.0, zero)
+        return _Known(level, zero, _outer(zero, zero), level * 0.0, zero)
     if isinstance(baseline, PadBaseline):
         return _pad(graph, baseline, place, xi)
     raise UsageError(
@@ -166,7 +172,7 @@ def _contact(graph: Graph, baseline: ContactBaseline, touch: _Touch) -> _Known:
     value, slope = g * s * s, g * s * (p - 0.5 * ratio)
     bend = g * (p * (p - 1.0) - p * ratio + 0.75 * ratio * ratio)
     outer = _outer(touch.normal, touch.normal)
-    hessian = bend.reshape(-1, 1, 1) * outer - slope.reshape(-1, 1, 1) * touch.bend
+    hessian = bend.spread(2) * outer - slope.spread(2) * touch.bend
     gradient, root = -slope * touch.normal, graph.sqrt(2.0 * value)
     return _Known(value, gradient, hessian, root, gradient / root)
 
@@ -189,14 +195,14 @@ def _pad(graph: Graph, baseline: PadBaseline, place: Value, xi: Value) -> _Known
     spread = np.zeros((len(i), k * k))  # from the entries i ≤ j to the whole matrix
     spread[np.arange(len(i)), i * k + j] = 1.0
     spread[np.arange(len(i)), j * k + i] = 1.0
-    S = (upper @ spread).reshape(-1, k, k)
-    u = (place @ D.T).reshape(-1, k, 1)
+    S = (upper @ spread).rows_as(k, k)
+    u = (place @ D.T).spread(2)
     v = S @ u
-    gradient = (S @ v).reshape(-1, k) @ D
+    gradient = (S @ v).rows_as(k) @ D
     hessian = graph.constant(D.T) @ (S @ S) @ D
-    twice = (v * v).sum(1).reshape(-1, 1)
+    twice = (v * v).sum(1).rows_as(1)
     if k == 1:
-        return _Known(0.5 * twice, gradient, hessian, v.reshape(-1, 1), S.reshape(-1, 1) @ D)
+        return _Known(0.5 * twice, gradient, hessian, v.rows_as(1), S.rows_as(1) @ D)
     root = graph.sqrt(twice)
     by = graph.where(root > 0.0, gradient / graph.where(root > 0.0, root, 1.0), 0.0)
     return _Known(0.5 * twice, gradient, hessian, root, by)
@@ -235,18 +241,18 @@ def _with_polynomial(
 
     gradient = graph.join(*[total(i) * (1.0 / half[i]) for i in range(k)])
     entries = [total(i, j) * (1.0 / (half[i] * half[j])) for i in range(k) for j in range(k)]
-    hessian = graph.join(*entries).reshape(-1, k, k)
+    hessian = graph.join(*entries).rows_as(k, k)
     return Slopes(slopes.value + total(), slopes.gradient + gradient, slopes.hessian + hessian)
 
 
 def _outer(a: Value, b: Value) -> Value:
     """Return a bᵀ (N, m, m) of vectors (N, m)."""
-    return a.reshape(0, -1, 1) * b.reshape(0, 1, -1)
+    return a.spread(2) * b.spread(1)
 
 
 def _through_box(slopes: Slopes, slope: Value, curvature: Value, felt: int) -> Slopes:
     """Take derivatives by saturated inputs to those by what came before the saturation."""
-    bent = (curvature * slopes.gradient).reshape(0, -1, 1) * np.eye(felt)
+    bent = (curvature * slopes.gradient).spread(2) * np.eye(felt)
     return Slopes(slopes.value, slopes.gradient * slope, slopes.hessian * _outer(slope, slope) + bent)
 
 
@@ -264,12 +270,12 @@ def _leave(graph: Graph, baseline: Any, touch: _Touch, slopes: Slopes, place: Va
     m, rest, curvature = touch.excess, 1.0 - touch.slope, touch.curvature
     usual = baseline.probe_radius if math.isfinite(baseline.probe_radius) else baseline.touched.reach
     bend = _bend(graph, touch.distance, place, g, STEP * usual)
-    matrix = [value.reshape(-1, 1, 1) for value in (m, rest, curvature)]
+    matrix = [value.spread(2) for value in (m, rest, curvature)]
     outer = _outer(d, d)
     J = matrix[0] * touch.bend - matrix[1] * outer + np.eye(3)
-    h = (touch.bend @ g.reshape(-1, 3, 1)).reshape(-1, 3)
-    along = (d * g).sum(1).reshape(-1, 1, 1)
-    new = (J @ g.reshape(-1, 3, 1)).reshape(-1, 3)
+    h = (touch.bend @ g.spread(2)).rows_as(3)
+    along = (d * g).sum(1).spread(2)
+    new = (J @ g.spread(2)).rows_as(3)
     hessian = (
         J @ H @ J.swap()
         + matrix[0] * bend
@@ -286,7 +292,7 @@ def _bend(graph: Graph, distance: Distance, place: Value, g: Value, step: float)
     parts = []
     for many, weight in ((1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)):
         bend = distance(place + (many * step) * way)[2]
-        parts.append((size * (weight / (12.0 * step))).reshape(-1, 1, 1) * bend)
+        parts.append((size * (weight / (12.0 * step))).spread(2) * bend)
     first, second, third, last = parts
     return first + second + third + last
 
@@ -300,15 +306,17 @@ def _answers(
     inputs: tuple[Value, Value, Value],
     finite: Value,
 ) -> None:
-    """Put energy, force, stiffness, depth, trust out; zero without contact, not-a-number where an input is."""
+    """Put energy, force, stiffness, depth, trust out; zero without contact.
+
+    Where an input is not finite, or so large that an answer is not, nothing pushes, and the rest is not-a-number.
+    """
     _, X, place = inputs
     kappa = graph.exp(slopes.value)
     value = kappa * known.energy
     b, g = known.gradient, slopes.gradient
     force = -(kappa * b + value * g)
-    stiffness = -kappa.reshape(-1, 1, 1) * (known.hessian + _outer(b, g) + _outer(g, b)) - value.reshape(
-        -1, 1, 1
-    ) * (_outer(g, g) + slopes.hessian)
+    stiffness = -kappa.spread(2) * (known.hessian + _outer(b, g) + _outer(g, b))
+    stiffness = stiffness - value.spread(2) * (_outer(g, g) + slopes.hessian)
     depth = graph.sqrt((place * place).sum(1)) if touch is None else touch.depth
     inside = _inside(graph, energy, X, depth)
     root = graph.sqrt(kappa)
@@ -320,16 +328,23 @@ def _answers(
         "slope": root * (known.by + 0.5 * known.root * g),
     }
     if energy.root is not None:
+        graph.stage = "deviation"
         outputs["deviation"] = _deviation(graph, energy, X, value, force)
+        graph.stage = "answers"
     if touch is not None:
-        flat, deep = touch.contact, touch.contact.reshape(-1, 1, 1)
+        flat, deep = touch.contact, touch.contact.spread(2)
         for name, out in outputs.items():
             outputs[name] = graph.where(deep if name == "stiffness" else flat, out, 0.0)
         inside = inside | ~touch.contact
+    whole = outputs["energy"] + outputs["force"].sum(1) + outputs["stiffness"].sum(1, 2).rows_as(1)
+    finite = finite & _finite(graph, whole + depth)  # no number may be larger than any
     shapes = {"stiffness": (3, 3), "force": (3,), "slope": (3,)}
     for name, out in (outputs | {"depth": depth}).items():
-        shown = finite.reshape(-1, 1, 1) if name == "stiffness" else finite
-        graph.output(name, graph.where(shown, out, math.nan), shapes.get(name, (1,)))
+        shown = finite.spread(2) if name == "stiffness" else finite
+        otherwise = (
+            0.0 if name in {"force", "stiffness"} else math.nan
+        )  # nobody is pushed by what is no number
+        graph.output(name, graph.where(shown, out, otherwise), shapes.get(name, (1,)))
     graph.output("inside", inside & finite, (1,), np.bool_)
 
 
@@ -344,8 +359,8 @@ def _inside(graph: Graph, energy: LearntEnergy, X: Value, depth: Value) -> Value
     if energy.region is not None:
         scaling = energy.network.scaling
         xi = (X - scaling.input_centre) / scaling.input_half
-        gap = xi.reshape(0, 1, -1) - energy.region.points[None]
-        nearest = (gap * gap).sum(2).least(1).reshape(-1, 1)
+        gap = xi.spread(1) - energy.region.points[None]
+        nearest = (gap * gap).sum(2).least(1).rows_as(1)
         inside = inside & (nearest <= energy.region.radius**2 * (1.0 + SLACK))
     return inside
 
@@ -361,7 +376,7 @@ def _deviation(graph: Graph, energy: LearntEnergy, X: Value, value: Value, force
     by = lines @ root  # (N, k, z)
     if k < 3:
         by = graph.constant(D.T) @ by
-    spread = force.reshape(-1, 3, 1) * moved.reshape(0, 1, -1) - value.reshape(-1, 1, 1) * by
-    total = graph.sqrt((spread * spread).sum(1, 2).reshape(-1, 1))
+    spread = _outer(force, moved) - value.spread(2) * by
+    total = graph.sqrt((spread * spread).sum(1, 2).rows_as(1))
     size = graph.sqrt((force * force).sum(1))
     return graph.where(size > 0.0, total / graph.where(size > 0.0, size, 1.0), 0.0)

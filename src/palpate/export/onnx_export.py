@@ -183,8 +183,9 @@ class OnnxAsker:
         """Return an answer's 19 numbers, the deviation and the flags for each row of X (N, 3 + p)."""
         baseline, names = self._energy.baseline, [o.name for o in self._session.get_outputs()]
         D = baseline.directions
-        finite = np.isfinite(X).all(axis=1)
-        X = np.where(finite[:, None], X, np.nan)  # an infinite place along one axis is none along another
+        X = np.where(
+            np.isfinite(X).all(axis=1)[:, None], X, np.nan
+        )  # an infinite place along one axis is none along another
         U = X if len(D) == 3 else np.hstack([X[:, :3] @ D.T, X[:, 3:]])
         got = dict(zip(names, self._session.run(None, {"x": U.astype(self._kind)}), strict=True))
         out = np.full((len(X), ANSWERS), np.nan)
@@ -192,6 +193,7 @@ class OnnxAsker:
             if name in got:
                 out[:, columns] = np.reshape(got[name], (len(X), -1))
         out[:, 14] = out[:, 0] + baseline.offset
+        finite = np.isfinite(out[:, 0])
         depth = out[:, 1]
         touching = np.full(len(X), True) if baseline.holds else depth > 0
         radius: Any = 0.0 if not np.isfinite(baseline.radius) else baseline.radius

@@ -102,9 +102,13 @@ class Value:
         numbers = [self.graph.integers([value]) for value in (start, stop, 1)]
         return self.graph.op("Slice", self, numbers[0], numbers[1], numbers[2])
 
-    def reshape(self, *shape: int) -> Value:
-        """Return the tensor in another shape; one length may be −1."""
-        return self.graph.op("Reshape", self, self.graph.integers(shape))
+    def rows_as(self, *shape: int) -> Value:
+        """Return the tensor (N, …) with another shape of its rows, (N, *shape); N may be 0."""
+        return self.graph.op("Reshape", self, self.graph.integers([0, *shape]))
+
+    def spread(self, *axes: int) -> Value:
+        """Return the tensor with further axes of length 1 at these places."""
+        return self.graph.op("Unsqueeze", self, self.graph.integers(axes))
 
     def sum(self, *axes: int) -> Value:
         """Return the sum over axes, which stay with length 1."""
@@ -126,11 +130,17 @@ class Graph:
     ----------
     dtype : type
         float64 or float32, of all numbers.
+
+    Attributes
+    ----------
+    stage : str
+        What is being worked out: nodes bear its name, so that a runtime's error says where.
     """
 
     def __init__(self, dtype: type[np.floating]) -> None:
         self.onnx = require_onnx()
         self.dtype = dtype
+        self.stage = "inputs"
         self._nodes: list[Any] = []
         self._constants: dict[tuple[Any, ...], str] = {}
         self._tensors: list[Any] = []
@@ -144,7 +154,9 @@ class Graph:
 
     def output(self, name: str, value: Value, shape: Sequence[int], kind: Any = None) -> None:
         """Name a value as an output (N, *shape) of the graph."""
-        self._nodes.append(self.onnx.helper.make_node("Identity", [value.name], [name]))
+        self._nodes.append(
+            self.onnx.helper.make_node("Identity", [value.name], [name], name=f"outputs/{name}")
+        )
         self._outputs.append(self._info(name, kind or self.dtype, [None, *shape]))
 
     def _info(self, name: str, dtype: Any, shape: list[int | None]) -> Any:
@@ -175,7 +187,8 @@ class Graph:
         """Return what an operator makes of values, numbers and arrays."""
         names = [(v if isinstance(v, Value) else self.constant(v)).name for v in operands]
         name = f"v{len(self._nodes)}"
-        self._nodes.append(self.onnx.helper.make_node(kind, names, [name], **attributes))
+        node = f"{self.stage}/{kind}_{len(self._nodes)}"
+        self._nodes.append(self.onnx.helper.make_node(kind, names, [name], name=node, **attributes))
         return Value(self, name)
 
     def exp(self, value: Value) -> Value:

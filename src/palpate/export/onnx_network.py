@@ -93,7 +93,7 @@ def network_slopes(graph: Graph, network: Network, xi: Value, felt: int) -> Slop
     value = xi @ tail[1:] + tail[0]
     slope, straight = tail[1 : 1 + felt, 0] / half[:felt], xi.columns(0, felt) * 0.0
     if not network.units:
-        bend = straight.reshape(0, -1, 1) * straight.reshape(0, 1, -1)
+        bend = straight.spread(2) * straight.spread(1)
         return Slopes(value, straight + slope, bend)
     units = _units(graph, network, xi, felt)
     w = weights[:, 0]
@@ -107,7 +107,7 @@ def network_slopes(graph: Graph, network: Network, xi: Value, felt: int) -> Slop
             curved = (units.second * units.pulled[i] * units.pulled[j]) @ (4.0 * w[:, None] / size)
             entries[i, j] = entries[j, i] = curved + units.first @ (2.0 * (w * gram)[:, None] / size)
     every = [entries[i, j] for i in range(felt) for j in range(felt)]
-    hessian = (graph.join(*every) if felt > 1 else every[0]).reshape(-1, felt, felt)
+    hessian = (graph.join(*every) if felt > 1 else every[0]).rows_as(felt, felt)
     return Slopes(value + units.phi @ weights, gradient, hessian)
 
 
@@ -118,10 +118,10 @@ def regressors(graph: Graph, network: Network, xi: Value, felt: int) -> tuple[Va
     first = [np.eye(1, 1 + n, 1 + i) / half[i] for i in range(felt)]
     if not network.units:
         flat = [one @ row for row in first]
-        return graph.join(one, xi), graph.join(*[row.reshape(0, 1, -1) for row in flat])
+        return graph.join(one, xi), graph.join(*[row.spread(1) for row in flat])
     units = _units(graph, network, xi, felt)
     lines = [
-        graph.join(one @ first[i], units.first * u * (2.0 / half[i])).reshape(0, 1, -1)
+        graph.join(one @ first[i], units.first * u * (2.0 / half[i])).spread(1)
         for i, u in enumerate(units.pulled)
     ]
     return graph.join(one, xi, units.phi), (graph.join(*lines) if felt > 1 else lines[0])
@@ -132,6 +132,7 @@ def add_network(graph: Graph, network: Network) -> None:
     n, m = len(network.inputs), len(network.outputs)
     scaling = network.scaling
     X = graph.input("x", n)
+    graph.stage = "network"
     row, lines = regressors(graph, network, (X - scaling.input_centre) / scaling.input_half, n)
     rows = _rows(network)
     graph.output("y", row @ rows, (m,))

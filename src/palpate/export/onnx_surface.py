@@ -40,7 +40,7 @@ def distance_to(graph: Graph, surface: TouchedSurface) -> Distance:
         gradient = graph.join(d[1, 0, 0], d[0, 1, 0], d[0, 0, 1]) / h
         xy, xz, yz = d[1, 1, 0], d[1, 0, 1], d[0, 1, 1]
         rows = (d[2, 0, 0], xy, xz, xy, d[0, 2, 0], yz, xz, yz, d[0, 0, 2])
-        return d[0, 0, 0], gradient, graph.join(*rows).reshape(-1, 3, 3) / (h * h)
+        return d[0, 0, 0], gradient, graph.join(*rows).rows_as(3, 3) / (h * h)
 
     return distance
 
@@ -89,16 +89,16 @@ def _tile_lookup(graph: Graph, table: np.ndarray) -> Lookup:
     def find(first: Sequence[Value]) -> Value:
         tile = node = graph.integers([0])
         for axis, (start, count) in enumerate(zip(first, counts, strict=True)):
-            shape = [-1, *(4 if i == axis else 1 for i in range(3))]
+            shape = [4 if i == axis else 1 for i in range(3)]
             along = start + one  # (N, 4)
             which = graph.op("Div", along, side)
-            within = (along - which * side).reshape(*shape)
-            tile = tile * graph.integers([count]) + which.reshape(*shape)
+            within = (along - which * side).rows_as(*shape)
+            tile = tile * graph.integers([count]) + which.rows_as(*shape)
             node = node * side + within
         begin = graph.op(
             "Cast", graph.op("Gather", graph.table(places), tile, axis=0), to=graph.onnx.TensorProto.INT64
         )
-        node = (begin * graph.integers([SIDE**3]) + node).reshape(-1, SIDE**3)
+        node = (begin * graph.integers([SIDE**3]) + node).rows_as(SIDE**3)
         if multiples is None:
             return graph.op("Gather", kept.ravel(), node, axis=0)
         return graph.real(graph.op("Gather", graph.table(kept.ravel()), node, axis=0)) * 2.0 ** multiples[1]
@@ -132,8 +132,8 @@ def _spline(graph: Graph, cells: Value, shape: Sequence[int], find: Lookup) -> d
         left //= 4
         wider: dict[tuple[int, ...], Value] = {}
         for orders, values in known.items():
-            four = values.reshape(-1, left, 4)
-            each = [graph.op("Gather", four, graph.integers([k]), axis=2).reshape(-1, left) for k in range(4)]
+            four = values.rows_as(left, 4)
+            each = [graph.op("Gather", four, graph.integers([k]), axis=2).rows_as(left) for k in range(4)]
             for order in range(3 - sum(orders)):
                 total: Any = None
                 for weight, value in zip(parts[axis][1][order], each, strict=True):
@@ -158,6 +158,6 @@ def _flat(
     gradient = graph.join(da * ax, da * ay, dz) @ axes / h
     xx, yy, xy = daa * ax * ax + da * axx, daa * ay * ay + da * ayy, daa * ax * ay + da * axy
     xz, yz = daz * ax, daz * ay
-    bend = graph.join(xx, xy, xz, xy, yy, yz, xz, yz, dzz).reshape(-1, 3, 3)
+    bend = graph.join(xx, xy, xz, xy, yy, yz, xz, yz, dzz).rows_as(3, 3)
     hessian = graph.constant(axes.T) @ bend @ axes / (h * h)
     return d[0, 0], gradient, hessian

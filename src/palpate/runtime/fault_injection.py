@@ -50,6 +50,7 @@ FAULTS: dict[str, _Kind] = {
     "safety event": _Kind(Fault.DEVICE_STOPPED),
     "out of reach": _Kind(Fault.IMPOSSIBLE_PLACE, 0.004),
     "leap": _Kind(Fault.IMPOSSIBLE_PLACE, 0.004),
+    "to and fro": _Kind(Fault.IMPOSSIBLE_PLACE, 0.013, 0.05),
     "outside": _Kind(Fault.OUT_OF_REGION, 0.1, 0.2),
     "clock ahead": _Kind(Fault.CLOCK_JUMP, 0.001, 0.001),
     "clock back": _Kind(Fault.CLOCK_JUMP, 0.001, 0.001),
@@ -70,6 +71,7 @@ _RAISED: dict[str, Exception] = {
 }
 _WATCHDOG = HARDWARE_PATIENCE - 1e-6  # s after which the device drops a force that isn't renewed
 _LEAP = np.array([0.04, 0.0, 0.0])  # m, within the reach of the device
+_ALTERNATION = np.array([0.004, 0.0, 0.0])  # m, from sample to sample
 _FAR = np.array([0.0, 0.0, 0.9])  # m, beyond it
 _DRIFT = 2.0  # m/s, along the hand's stroke: a motion that is possible
 _FELT = 0.02  # N from which on the hand is in a touch
@@ -92,7 +94,7 @@ class FaultyDevice:
     """
 
     def __init__(self, hand: SimulatedHand) -> None:
-        self.hand, self.fault = hand, ""
+        self.hand, self.fault, self._turned = hand, "", False
         self.sample, self._place = Sample(), np.zeros(3)
         self.sample.holding = True
         self._now, self._written, self._since = -math.inf, -math.inf, 0.0
@@ -127,6 +129,9 @@ class FaultyDevice:
             self._place += _FAR
         elif fault == "leap":
             self._place += _LEAP
+        elif fault == "to and fro":
+            self._turned = not self._turned
+            self._place += _ALTERNATION * self._turned
         elif fault == "outside":
             self._place[1] -= _DRIFT * self._since
         return sample

@@ -182,7 +182,8 @@ class Loop:
         self.stop, self.dead_man = Stop(), dead_man
         self.released, self.open, self.withheld = dead_man, False, Fault.NONE
         self._buttons, self._switch, self._driver_fails = 0, False, False
-        self._check = PlaceCheck(traits.reach or 2.0 * traits.radius, traits.speed, self.period)
+        reach = traits.reach or 2.0 * traits.radius
+        self._check = PlaceCheck(reach, traits.speed, self.period, traits.noise)
         self.longest = max(HARDWARE_PATIENCE if self.motors else _PAUSE, 2.5 * self.period)
         self._ticked, self._edge = math.nan, EDGE * radius
         # of hardware the force is gone at the end of its patience, and not a tick later

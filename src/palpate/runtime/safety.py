@@ -79,7 +79,16 @@ HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised de
 _SHORTEST_RAMP = 0.050  # s
 _WARMING = 10.0  # s over which motors average the force; windings take longer, which is on the safe side
 _WARM = 0.8  # share of the continuous force's square from which on the limit comes down
-_DOUBTS, _DOUBTFUL = 3, 0.015  # impossible samples in a row, and the time, s, after which they are a fault
+_DOUBTS, _DOUBTFUL = (
+    3,
+    0.015,
+)  # count of impossible samples, and time of them, s, from which on they are a fault
+_LEAK = (
+    0.1  # of the count, for each believed sample: a line that spoils more than one sample in ten is broken
+)
+_ACCELERATION = 150.0  # m/s²: fast hands stay below 100, and 12 N on a bare handle of 0.1 kg make 120
+_NOISE = 3e-4  # m rms along each axis that every sensor is granted: several times that of any that is sold
+_OUTLIER = 4.5  # times the rms along each axis: of the three axes together one in ten thousand is larger
 _RISE = 0.020  # s from zero to full force where no slew is given: a tenth of a reaction time
 
 
@@ -204,10 +213,17 @@ def stalled(now: float, seen: float, patience: float) -> bool:
 
 
 class PlaceCheck:
-    """Doubts places that are finite but impossible: out of the arm's reach, or too far from the last one.
+    """Doubts places that are finite but impossible: out of the arm's reach, too far from the last one, too sudden.
 
-    A single bad sample is passed over; three in a row, or 15 ms of them, are a fault. After that the newest place is
-    what the next one is compared with, so that an arm which was moved while nobody looked is believed again.
+    A place is too sudden where it misses the place to which the motion so far leads by more than the acceleration of
+    any hand explains, and more than the noise of a sensor does. So 4 mm to and fro from sample to sample are impossible
+    at 1 kHz and at 200 Hz; noise of 0.3 mm rms and steps of 0.1 mm are not.
+
+    A single bad sample is passed over. After a doubt, a place that is merely sudden is believed: a handle that hits its
+    end stop is that once. Each doubt counts 1, each believed sample takes a tenth of one away, and a count of three is
+    a fault: three bad samples in a row, or nine to and fro, and never one in eleven. 15 ms of doubts are a fault
+    too. After three in a row the newest place is what the next one is compared with, so that an arm which was moved
+    while nobody looked is believed again.
 
     Attributes
     ----------
@@ -224,38 +240,63 @@ class PlaceCheck:
         No handle is faster than this, m/s.
     period : float
         Shortest time between two samples, s.
+    noise : float
+        Noise of the sensor along each axis, m rms; every sensor is granted 0.3 mm.
     """
 
-    def __init__(self, reach: float, speed: float, period: float) -> None:
+    def __init__(self, reach: float, speed: float, period: float, noise: float = 0.0) -> None:
         self.doubts, self.fault = 0, False
         self._reach, self._speed, self._period = reach, speed, period
+        self._slack = _OUTLIER * max(noise, _NOISE)
         self.forget()
 
     def forget(self) -> None:
         """Begin anew: nobody holds the device."""
-        self.doubts, self.fault = 0, False
-        self._last = (math.nan, math.nan, math.nan)
-        self._time, self._since = -math.inf, 0.0
+        self.doubts, self.fault, self._count = 0, False, 0.0
+        self._last = self._velocity = (math.nan, math.nan, math.nan)
+        # of the last sample; of the last believed one; from when on the hand may have been under way
+        self._time = self._believed = self._near = -math.inf
+        self._span, self._since = math.nan, 0.0  # s between the last two believed samples; when doubts began
 
     def see(self, x: float, y: float, z: float, time: float, now: float) -> None:
         """Take a finite place, m, of the time (s) that its sample bears, in the tick that began at `now`, s."""
         if time == self._time:  # the sample of the tick before
-            self.fault = self.doubts > 0 and (self.fault or now - self._since > _DOUBTFUL)
+            self.fault = self.fault or (self.doubts > 0 and now - self._since > _DOUBTFUL)
             return
         u, v, w = self._last
-        way = math.hypot(x - u, y - v, z - w)
-        longest = self._speed * max(self._period, time - self._time) if self._time > -math.inf else math.inf
+        longest = self._speed * max(self._period, time - self._near)
+        span = max(self._period, time - self._believed)
         self._time = time
-        if way > longest or math.hypot(x, y, z) > self._reach:  # no way is known from the first place
-            if not self.doubts:
-                self._since = now
-            self.doubts += 1
-            self.fault = self.fault or self.doubts >= _DOUBTS or now - self._since > _DOUBTFUL
-            if not self.fault:
+        # no way is known from the first place
+        far = math.hypot(x - u, y - v, z - w) > longest or math.hypot(x, y, z) > self._reach
+        if far or (self.doubts == 0 and self._is_sudden(x, y, z, span)):
+            self._near = time if far else self._near
+            self._doubt(now)
+            if self.doubts < _DOUBTS and not self.fault:
                 return
+            self._velocity = (math.nan, math.nan, math.nan)  # of a leap it says nothing
         else:
-            self.doubts, self.fault = 0, False
-        self._last = (x, y, z)
+            self.doubts, self._count = 0, max(0.0, self._count - _LEAK)
+            self.fault = self._count >= _DOUBTS
+            self._velocity = ((x - u) / span, (y - v) / span, (z - w) / span)
+        self._last, self._span = (x, y, z), span
+        self._believed = self._near = time
+
+    def _doubt(self, now: float) -> None:
+        if not self.doubts:
+            self._since = now
+        self.doubts += 1
+        self._count = min(self._count + 1.0, _DOUBTS + 1.0)
+        self.fault = self.fault or self._count >= _DOUBTS or now - self._since > _DOUBTFUL
+
+    def _is_sudden(self, x: float, y: float, z: float, span: float) -> bool:
+        """Return whether a place, m, misses the one to which the last motion leads in `span`, s, by too much."""
+        (u, v, w), (a, b, c) = self._last, self._velocity
+        missed = math.hypot(x - u - span * a, y - v - span * b, z - w - span * c)
+        ratio = span / self._span
+        # of independent noise in the three samples that the miss is made of
+        spread = math.sqrt(1.0 + (1.0 + ratio) ** 2 + ratio * ratio)
+        return missed > _ACCELERATION * span * (span + self._span) / 2.0 + self._slack * spread
 
 
 class Stop:

@@ -174,11 +174,18 @@ class LearntEnergy:
         parts = max(1, min(available_cores(), len(X) // _PART))
         if parts == 1:
             self._fill(places, answers, inside)
-            return X, answers, inside
-        ends = np.linspace(0, len(X), parts + 1).astype(int)
-        some = [slice(a, b) for a, b in itertools.pairwise(ends)]
-        with ThreadPoolExecutor(parts) as threads:  # the kernels need no lock of the interpreter
-            list(threads.map(lambda rows: self._fill(places[rows], answers[rows], inside[rows]), some))
+        else:
+            ends = np.linspace(0, len(X), parts + 1).astype(int)
+            some = [slice(a, b) for a, b in itertools.pairwise(ends)]
+            with ThreadPoolExecutor(parts) as threads:  # the kernels need no lock of the interpreter
+                list(threads.map(lambda rows: self._fill(places[rows], answers[rows], inside[rows]), some))
+        if not np.isfinite(answers[:, 0]).all():
+            row = int(np.flatnonzero(~np.isfinite(answers[:, 0]))[0])
+            raise UsageError(
+                f"Row {row} of {len(X)} inputs is too large to be answered: {X[row]}.",
+                why="The force there is larger than any number.",
+                fix="Ask within the trained ranges, or near them.",
+            )
         return X, answers, inside
 
     def _places(self, X: np.ndarray) -> np.ndarray:

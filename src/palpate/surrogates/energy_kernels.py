@@ -279,8 +279,8 @@ def _one(
 ):
     """Fill `answer` at a place (3,) and parameters (p,); whether that is inside the trained region.
 
-    Without contact the answer is exact wherever it is, and counts as inside. Where an input is not finite the
-    whole answer is not-a-number.
+    Without contact the answer is exact wherever it is, and counts as inside. Where an input is not finite, or so large
+    that numbers overflow, the whole answer is not-a-number.
     """
     answer[:] = 0.0
     if not _gather(position, parameters, axes, lines):
@@ -306,6 +306,10 @@ def _one(
     _to_space(felt, axes, small)
     baseline_leave(position, base, small, numbers, args)
     _assemble(answer, math.exp(log_kappa), base, small)
+    for i in range(answer.size):
+        if not math.isfinite(answer[i]):
+            answer[:] = math.nan
+            return False
     return _inside(lines, limits, base[1], numbers, points, scales, small)
 
 

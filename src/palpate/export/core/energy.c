@@ -100,6 +100,13 @@ PP_PART int pp_inside(const pp_model *m, const pp_real *line, pp_real s) {
   return inside;
 }
 
+/* An answer where there is none: nothing pushes, and all else is not-a-number. */
+PP_PART int32_t pp_no_answer(pp_real *answer) {
+  int32_t i;
+  for (i = 0; i < PP_ANSWER; i++) answer[i] = i >= PP_FORCE && i < PP_PLAIN ? R(0) : pp_nan();
+  return PP_NOT_A_NUMBER;
+}
+
 /* Fill the answer (PP_ANSWER) at a place x (3), m, and parameters p; the flags. */
 PP_PART int32_t pp_answer(const pp_model *m, const pp_real *x, const pp_real *p, pp_real *answer) {
   const int32_t *head = m->a[PP_HEAD].whole;
@@ -110,8 +117,8 @@ PP_PART int32_t pp_answer(const pp_model *m, const pp_real *x, const pp_real *p,
   int32_t i, j, flags;
   int finite = pp_finite(x[0]) && pp_finite(x[1]) && pp_finite(x[2]);
   for (i = k; i < n; i++) finite = finite && pp_finite(p[i - k]);
-  for (i = 0; i < PP_ANSWER; i++) answer[i] = finite ? R(0) : pp_nan();
-  if (!finite) return PP_NOT_A_NUMBER;
+  if (!finite) return pp_no_answer(answer);
+  memset(answer, 0, PP_ANSWER * sizeof *answer);
   memset(&w, 0, sizeof w);
   pp_feel(m, x, w.line);
   for (i = k; i < n; i++) w.line[i] = p[i - k];
@@ -135,6 +142,9 @@ PP_PART int32_t pp_answer(const pp_model *m, const pp_real *x, const pp_real *p,
   pp_to_space(g, H, m->a[PP_AXES].real, k, &w);
   PP_LEAVE(m, x, &w);
   pp_assemble(PP_EXP(log_kappa), &w, answer);
+  for (i = 0; i < PP_ANSWER; i++) {
+    if (!pp_finite(answer[i])) return pp_no_answer(answer); /* the place is so far away that numbers overflow */
+  }
   flags = PP_CONTACT;
   if (pp_inside(m, w.line, w.base[1])) flags |= PP_TRUSTED;
   radius = head[PP_RADIUS_INPUT] < 0 ? numbers[4] : w.line[head[PP_RADIUS_INPUT]];
@@ -158,8 +168,9 @@ PP_PART pp_real pp_deviation(const pp_model *m, const pp_real *x, const pp_real 
   pp_real line[PP_MOST], xi[PP_MOST], total = R(0);
   int32_t i, a, c, r;
   int l;
+  if (!pp_finite(value)) return pp_nan();
   if (size == R(0)) return R(0);
-  if (root->n[0] == 0 || !pp_finite(size)) return pp_nan();
+  if (root->n[0] == 0) return pp_nan();
   pp_feel(m, x, line);
   for (i = k; i < n; i++) line[i] = p[i - k];
   pp_scale(m->a + PP_NET, line, xi);

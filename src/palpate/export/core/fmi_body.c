@@ -1,12 +1,48 @@
 /* What both versions of FMI ask of a body: values, steps, states, and their derivatives. */
 
-/* the memory's answer to a step that is taken on a copy of what it keeps */
+/* the memory's answer to a step that is taken on a copy of what it keeps; no force where an input is no number */
 static void try_step(Instance *c, const double *kept, double dt) {
   memcpy(c->trial, kept, (size_t)c->size * sizeof(double));
-  if (!pp_step(&c->model, c->trial, c->now.x, c->answer[PP_AMPLITUDE], c->answer + PP_SLOPE, dt, c->now.force)) {
-    c->now.force[0] = c->now.force[1] = c->now.force[2] = pp_nan();
-  }
+  pp_step(&c->model, c->trial, c->now.x, c->answer[PP_AMPLITUDE], c->answer + PP_SLOPE, dt, c->now.force);
   c->stored = c->trial[0];
+}
+
+/* The force of the damping, by the mean velocity of the last step: along the felt directions of what is held; of a probe
+ * along the force of the body, which it never turns round: nothing pulls a probe back. */
+static void renew_drag(Instance *c) {
+  const double *axes = c->arrays[PP_AXES].real, *f = c->now.force, scale = c->now.scale, d = c->now.damping;
+  const int is_probe = c->arrays[PP_HEAD].whole[PP_BASELINE_CODE] == 1;
+  const int32_t felt = is_probe ? 1 : c->arrays[PP_HEAD].whole[PP_FELT];
+  const double size = PP_ABS(scale) * PP_SQRT(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+  int32_t a, i;
+  memset(c->drag, 0, sizeof c->drag);
+  if (d == 0.0 || (is_probe && !(size > 0.0)) || c->flags & (PP_TOO_DEEP | PP_NOT_A_NUMBER)) return;
+  for (a = 0; a < felt; a++) {
+    double along = 0.0, axis[3], pull;
+    for (i = 0; i < 3; i++) {
+      axis[i] = is_probe ? scale * f[i] / size : axes[3 * a + i];
+      along += axis[i] * (c->probing && c->now.step > 0.0 ? (c->now.x[i] - c->now.from[i]) / c->now.step : c->now.velocity[i]);
+    }
+    pull = is_probe ? pp_least(d * along, size) : d * along;
+    for (i = 0; i < 3; i++) c->drag[i] -= pull * axis[i];
+  }
+}
+
+/* Warn once of a step in which the force goes stale: held for a step, it acts on a mass as a damping of -k step / 2, and
+ * lets it leave the body faster than it came by a factor of exp(pi zeta), zeta = (k step / 2 - damping) / (2 sqrt(k mass)).
+ * The warning begins at a factor of 1.1, and where the damping itself turns the mass round within a step. */
+static void check_step(Instance *c, double dt) {
+  const double *f = c->answer + PP_FORCE, *K = c->answer + PP_STIFFNESS, m = c->now.mass, d = c->now.damping;
+  const double square = f[0] * f[0] + f[1] * f[1] + f[2] * f[2];
+  double k = 0.0;
+  char text[192];
+  int i;
+  if (c->now.slow || !(square > 0.0) || !(m > 0.0)) return;
+  for (i = 0; i < 9; i++) k -= c->now.scale * K[i] * f[i / 3] * f[i % 3] / square;
+  if (!(k > 0.0) || (0.5 * k * dt - d <= 0.06 * PP_SQRT(k * m) && d * dt <= m)) return;
+  c->now.slow = 1;
+  snprintf(text, sizeof text, "A mass of %g kg gains speed at %.3g N/m in steps of %g s. Take shorter ones, or damping=%.2g.", m, k, dt, 0.5 * k * dt);
+  say(c, WARNING, text);
 }
 
 /* Renew the answer, and warn once where the place leaves the trained region.
@@ -30,12 +66,13 @@ static void renew(Instance *c) {
   } else { /* before its first step a body with a memory answers as one that nothing was done to */
     memcpy(c->now.force, c->answer + PP_FORCE, sizeof c->now.force);
   }
-  if (c->flags & PP_TOO_DEEP) memset(c->now.force, 0, sizeof c->now.force);
+  if (c->flags & (PP_TOO_DEEP | PP_NOT_A_NUMBER)) memset(c->now.force, 0, sizeof c->now.force);
+  renew_drag(c);
   if (c->flags & PP_TRUSTED) {
     c->now.warned = 0;
   } else if (!c->now.warned && !c->probing && (c->now.phase & RUNNING)) {
     c->now.warned = 1;
-    say(c, WARNING, c->flags & PP_NOT_A_NUMBER ? "An input is not a finite number." : "The place is outside of the trained region.");
+    say(c, WARNING, c->flags & PP_NOT_A_NUMBER ? "An input is not a finite number, or too large to be answered." : "The place is outside of the trained region.");
   }
 }
 
@@ -54,22 +91,31 @@ static const double *rates(Instance *c) {
 }
 
 static void advance(Instance *c, double dt) {
+  int i;
   c->now.step = dt;
-  renew(c);
+  for (i = 0; i < 3; i++) {
+    c->now.velocity[i] = dt > 0.0 ? (c->now.x[i] - c->now.to[i]) / dt : 0.0;
+    c->now.from[i] = c->now.to[i];
+    c->now.to[i] = c->now.x[i];
+  }
+  check_step(c, dt);
+  renew_drag(c);
   if (!c->size) return;
   memcpy(c->before, c->numbers, (size_t)c->size * sizeof(double));
   c->now.stepped = 1;
-  if (!pp_step(&c->model, c->numbers, c->now.x, c->answer[PP_AMPLITUDE], c->answer + PP_SLOPE, dt, c->now.force)) {
-    c->now.force[0] = c->now.force[1] = c->now.force[2] = pp_nan();
-  }
+  pp_step(&c->model, c->numbers, c->now.x, c->answer[PP_AMPLITUDE], c->answer + PP_SLOPE, dt, c->now.force);
   if (c->flags & PP_TOO_DEEP) memset(c->now.force, 0, sizeof c->now.force);
+  renew_drag(c);
   c->stored = c->numbers[0];
   c->lost = c->numbers[1];
   c->rated = 0;
 }
 
+/* A step from or to no place is not taken: nothing is remembered of it, and nothing pushes. */
 static int take_step(Instance *c, double time, double step) {
   if (!(step >= 0.0) || !pp_finite(step) || !pp_finite(time)) return refuse(c, "A step takes a finite time that is not negative.");
+  renew(c);
+  if (c->flags & PP_NOT_A_NUMBER) return DISCARD;
   advance(c, step);
   c->now.time = time + step;
   return OK;
@@ -92,6 +138,8 @@ static int is_parameter(const Instance *c, uint32_t v) { return v >= PARAMETER &
 static int value_of(Instance *c, uint32_t v, double *value) {
   if (v < 3) *value = c->now.x[v];
   else if (v == SCALE) *value = c->now.scale;
+  else if (v == DAMPING) *value = c->now.damping;
+  else if (v == MASS) *value = c->now.mass;
   else if (v == TIME) *value = c->now.time;
   else if (is_parameter(c, v)) *value = c->now.p[v - PARAMETER];
   else if (v >= STATE) {
@@ -100,7 +148,7 @@ static int value_of(Instance *c, uint32_t v, double *value) {
     else return 0;
   } else {
     renew(c);
-    if (v <= FZ) *value = c->now.scale * c->now.force[v - FX];
+    if (v <= FZ) *value = c->now.scale * c->now.force[v - FX] + c->drag[v - FX];
     else if (v == ENERGY) *value = c->now.scale * c->answer[PP_ENERGY];
     else if (v == DEPTH) *value = c->answer[PP_DEPTH];
     else if (v == DEVIATION) {
@@ -117,7 +165,9 @@ static int value_of(Instance *c, uint32_t v, double *value) {
 /* whether the variable could be set */
 static int set_value(Instance *c, uint32_t v, double value) {
   if (v < 3) c->now.x[v] = value;
-  else if (v == SCALE) c->now.scale = value;
+  else if (v == SCALE && pp_finite(value)) c->now.scale = value;
+  else if (v == DAMPING && pp_finite(value) && value >= 0.0) c->now.damping = value;
+  else if (v == MASS && pp_finite(value) && value >= 0.0) c->now.mass = value;
   else if (is_parameter(c, v)) c->now.p[v - PARAMETER] = value;
   else if (state_of(c, v) >= 0 && (c->now.phase & (INSTANTIATED | INITIALIZING))) {
     pp_set_state(&c->model, c->numbers, state_of(c, v), value);
@@ -127,20 +177,25 @@ static int set_value(Instance *c, uint32_t v, double value) {
   return 1;
 }
 
+static int without_answer(Instance *c) {
+  renew(c);
+  return (c->flags & PP_NOT_A_NUMBER) != 0;
+}
+
 static int get_reals(Instance *c, const uint32_t *which, size_t count, double *values) {
   size_t i;
   if (count && (!which || !values)) return refuse(c, "Real values need references and room for values.");
   for (i = 0; i < count; i++) {
     if (!value_of(c, which[i], &values[i])) return refuse(c, "There is no real variable of this reference.");
   }
-  return OK;
+  return c->now.phase == CONTINUOUS && without_answer(c) ? DISCARD : OK; /* a solver tries another state */
 }
 
 static int set_reals(Instance *c, const uint32_t *which, size_t count, const double *values) {
   size_t i;
   if (count && (!which || !values)) return refuse(c, "Real values need references and values.");
   for (i = 0; i < count; i++) {
-    if (!set_value(c, which[i], values[i])) return refuse(c, "There is no real variable of this reference that may be set now.");
+    if (!set_value(c, which[i], values[i])) return refuse(c, "There is no real variable of this reference that may be set now, to this value.");
   }
   return OK;
 }
@@ -154,6 +209,7 @@ static int flag_of(Instance *c, uint32_t i) {
 
 static void end_initialization(Instance *c) {
   c->now.phase = c->exchange ? EVENT : STEPPING;
+  memcpy(c->now.to, c->now.x, sizeof c->now.to);
   c->known = 0;
   renew(c);
 }
@@ -227,7 +283,7 @@ static int set_states(Instance *c, const double *values, size_t count) {
 static int get_rates(Instance *c, double *values, size_t count) {
   if ((int64_t)count != c->states || (count && !values)) return refuse(c, "There is another number of continuous states.");
   if (count) memcpy(values, rates(c), count * sizeof(double));
-  return OK;
+  return without_answer(c) ? DISCARD : OK;
 }
 
 static int get_nominals(Instance *c, double *values, size_t count) {

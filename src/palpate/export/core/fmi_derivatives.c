@@ -1,6 +1,6 @@
 /* Directional derivatives of outputs and rates, by inputs, parameters and states.
  *
- * Force and energy of a body without a memory by the place: its stiffness, in closed form. All others are central
+ * Force and energy of a body without a memory and damping by the place: its stiffness, in closed form. All others are central
  * differences along the seed, which moves no variable by more than 1e-5 of its range or usual size; in the states they
  * have no error but rounding, since force and energy are of second order in them, and the rates of first.
  *
@@ -8,10 +8,10 @@
  * this step took: its length and what was remembered at its beginning are kept.
  */
 static int is_input(const Instance *c, uint32_t v) {
-  return v < 3 || v == SCALE || is_parameter(c, v) || (c->exchange && state_of(c, v) >= 0);
+  return v < 3 || v == SCALE || v == DAMPING || v == MASS || is_parameter(c, v) || (c->exchange && state_of(c, v) >= 0);
 }
 
-static int is_closed(const Instance *c, uint32_t v) { return !c->size && v >= FX && v <= ENERGY; }
+static int is_closed(const Instance *c, uint32_t v) { return !c->size && !c->damped && v >= FX && v <= ENERGY; }
 
 /* usual size of what a variable takes */
 static double extent(const Instance *c, uint32_t v) {
@@ -19,7 +19,7 @@ static double extent(const Instance *c, uint32_t v) {
   const int32_t felt = c->arrays[PP_LIMITS].n[1] - c->parameters;
   double most = 0.0;
   int32_t i;
-  if (v == SCALE) return 1.0;
+  if (v == SCALE || v == DAMPING || v == MASS) return 1.0;
   if (v >= STATE) return c->usual;
   if (is_parameter(c, v)) return high[felt + (int32_t)(v - PARAMETER)] - low[felt + (int32_t)(v - PARAMETER)];
   for (i = 0; i < felt; i++) most = pp_most(most, high[i] - low[i]);
@@ -29,6 +29,8 @@ static double extent(const Instance *c, uint32_t v) {
 static void move(Instance *c, uint32_t v, double by) {
   if (v < 3) c->now.x[v] += by;
   else if (v == SCALE) c->now.scale += by;
+  else if (v == DAMPING) c->now.damping += by;
+  else if (v == MASS) c->now.mass += by;
   else if (v < STATE) c->now.p[v - PARAMETER] += by;
   else pp_set_state(&c->model, c->numbers, state_of(c, v), pp_state(&c->model, c->numbers, state_of(c, v)) + by);
   c->known = 0;
@@ -71,7 +73,9 @@ static int directional(Instance *c, const uint32_t *unknown, size_t unknowns, co
   if ((unknowns && (!unknown || !values)) || (knowns && (!known || !seed))) {
     return refuse(c, "Directional derivatives need references, seeds and room for values.");
   }
+  c->damped = c->now.damping > 0.0;
   for (j = 0; j < knowns; j++) {
+    c->damped |= known[j] == DAMPING;
     if (!is_input(c, known[j])) return refuse(c, "There is no input, parameter or state of this reference to derive by.");
   }
   for (i = 0; i < unknowns; i++) {

@@ -27,13 +27,14 @@ enum { INSTANTIATED = 1, INITIALIZING = 2, EVENT = 4, CONTINUOUS = 8, STEPPING =
  * rates after those */
 enum {
   FX = 3, FY = 4, FZ = 5, ENERGY = 6, DEPTH = 7, DEVIATION = 8, SCALE = 9, STORED = 10, LOST = 11, TIME = 15, PARAMETER = 16,
-  STATE = 64
+  DAMPING = 48, MASS = 49, STATE = 64
 };
 
 /* everything that changes while an instance lives; the memory's numbers follow it */
 typedef struct {
-  double x[3], p[PP_MOST], scale, time, force[3], step; /* step: the last one's length */
-  int phase, stepped, warned, flags, remembers; /* flags at the last event; whether states were set by hand */
+  double x[3], p[PP_MOST], scale, damping, mass, time, force[3], step; /* step: the last one's length */
+  double from[3], to[3], velocity[3];                 /* places at the ends of the last step, and its mean velocity */
+  int phase, stepped, warned, slow, flags, remembers; /* flags at the last event; whether states were set by hand */
 } Moment;
 
 typedef struct Instance Instance;
@@ -45,8 +46,8 @@ struct Instance {
   double *work, *numbers, *before, *trial, *kept, *rates;
   Moment now, start;
   int32_t parameters, size, states;
-  int exchange, known, flags, deviated, rated, probing;
-  double answer[PP_ANSWER], deviation, usual, stored, lost;
+  int exchange, known, flags, deviated, rated, probing, damped;
+  double answer[PP_ANSWER], drag[3], deviation, usual, stored, lost;
   void (*tell)(Instance *, int, const char *, const char *);
   void (*logger)(void);
   void *environment;
@@ -162,6 +163,7 @@ static void go_to_start(Instance *c) {
   int32_t i, a;
   c->now.phase = INSTANTIATED;
   c->now.scale = 1.0;
+  c->now.mass = 0.05;
   for (i = 0; i < c->parameters; i++) c->now.p[i] = 0.5 * (low[felt + i] + high[felt + i]);
   for (i = 0; i < 3; i++) {
     if (c->arrays[PP_HEAD].whole[PP_BASELINE_CODE] == 1) {

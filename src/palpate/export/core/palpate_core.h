@@ -68,7 +68,7 @@ enum { PP_INPUTS = 0, PP_FELT = 1, PP_BASELINE_CODE = 2, PP_MEMORY_CODE = 3, PP_
 enum {
   PP_CONTACT = 1,      /* the probe touches the body, or the body is held */
   PP_TRUSTED = 2,      /* inside the trained region; without contact the answer is exact and counts as inside */
-  PP_NOT_A_NUMBER = 4, /* an input was not finite, and every answer is not-a-number */
+  PP_NOT_A_NUMBER = 4, /* an input was no finite number, or an answer is none: nothing pushes, the rest is not-a-number */
   PP_TOO_DEEP = 8      /* so far inside that the body should let go of the probe: take the force for zero */
 };
 

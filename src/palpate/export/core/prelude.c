@@ -8,6 +8,10 @@
 #pragma GCC optimize("peel-loops")
 #endif
 
+#ifdef __cplusplus
+#define restrict __restrict
+#endif
+
 #define R(number) ((pp_real)(number))
 #ifdef PP_SINGLE
 #define PP_SQRT sqrtf

@@ -91,7 +91,7 @@ PP_EXPORT("step") int32_t wasm_step(pp_real dt) {
   if (wasm_arrays[PP_HEAD].whole[PP_MEMORY_CODE] == 0) return flags;
   if (!pp_step(&wasm_model, wasm_state, wasm_asked, wasm_answer[PP_AMPLITUDE], wasm_answer + PP_SLOPE, dt,
                    wasm_answer + PP_FORCE)) {
-    flags |= PP_NOT_A_NUMBER;
+    flags |= PP_NOT_A_NUMBER; /* and the force is zero */
   }
   return flags;
 }

@@ -10,7 +10,7 @@ import contextlib
 import select
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from urllib.parse import urlsplit
 
 from palpate.errors import DeviceError, DeviceLostError, UsageError
@@ -18,8 +18,13 @@ from palpate.errors import DeviceError, DeviceLostError, UsageError
 __all__ = ["WebsocketChannel"]
 
 _OPENING, _GOODBYE = 2.0, 0.2  # s
-_CHUNK = 65536  # bytes
-_MOST_CHUNKS = 16  # at a time: a service that sends without end is not waited for
+_BUDGET = 2.5e-4  # s, a quarter of a tick, for what has come: the rest is left to the next call
+_MOST_MESSAGES = 16  # to a call, for the same reason: their reader takes time for each
+_CHUNK = 4096  # bytes
+_SLICE = 256  # bytes that are read without a look at the clock: more than a hundred pings fit in
+_LARGEST = (
+    32768  # bytes of a message: several times the longest of any device service; JSON of it takes half a tick
+)
 _REMEDY = "Check that it runs, and start again."
 
 
@@ -32,6 +37,8 @@ class WebsocketChannel:
         Address, such as ``ws://localhost:10001``.
     service : str
         Name of what answers there, for messages.
+    clock : callable
+        Returns the time, s, by which `receive` keeps to its budget.
 
     Raises
     ------
@@ -41,7 +48,7 @@ class WebsocketChannel:
         If nothing answers there, or not as a websocket.
     """
 
-    def __init__(self, url: str, service: str) -> None:
+    def __init__(self, url: str, service: str, clock: Callable[[], float] = time.perf_counter) -> None:
         from websockets.client import ClientProtocol
         from websockets.exceptions import WebSocketException
         from websockets.frames import Opcode
@@ -60,7 +67,10 @@ class WebsocketChannel:
             raise UsageError(
                 f"{url} is encrypted, which no device service is.", fix="Write ws:// and not wss://."
             )
-        self._protocol, self._part = ClientProtocol(uri), b""
+        self._protocol, self._clock = ClientProtocol(uri, max_size=_LARGEST), clock
+        self._part = self._unread = self._unsent = b""
+        self._messages: list[str] = []
+        self._ended = False
         try:
             self._socket = socket.create_connection((host, port), _OPENING)
         except OSError as error:
@@ -78,18 +88,18 @@ class WebsocketChannel:
         try:
             self._protocol.send_request(self._protocol.connect())
             self._flush()
-            self._early = self._protocol.events_received()
-            while not self._early and not self._protocol.handshake_exc:
+            early = self._protocol.events_received()
+            while not early and not self._protocol.handshake_exc:
                 data = self._socket.recv(_CHUNK)
                 if not data:
                     break
                 self._protocol.receive_data(data)
-                self._early = self._protocol.events_received()
+                early = self._protocol.events_received()
         except OSError as error:
             raise self._failure("does not answer as a websocket", str(error)) from error
-        if self._protocol.handshake_exc or not self._early:
+        if self._protocol.handshake_exc or not early:
             raise self._failure("does not answer as a websocket", str(self._protocol.handshake_exc or ""))
-        self._early = self._early[1:]  # frames that came along with the response
+        self._take(early[1:])  # frames that came along with the response
 
     def send(self, text: str) -> None:
         """Send one message now.
@@ -104,40 +114,57 @@ class WebsocketChannel:
             self._flush()
         except Exception as error:
             raise self._lost("takes no message", f"{type(error).__name__}: {error}") from error
+        if self._unsent:
+            raise self._lost("takes no message", "What was sent before is not read.")
 
     def receive(self, wait: float) -> list[str]:
-        """Return the messages that have arrived, waiting for the first at most `wait`, s.
+        """Return messages that have arrived, waiting for the first at most `wait`, s.
+
+        What takes longer than a quarter of a millisecond to read is left to the next call, so that a service which
+        sends without end, pings or numbers, delays no tick.
 
         Raises
         ------
         DeviceLostError
-            If the connection is gone and nothing is left to read.
+            If the connection is gone and nothing is left to read, or a message is larger than any of a device.
         """
-        messages = self._messages(self._early)
-        self._early = []
-        if wait > 0.0 and not messages:
-            select.select(self._poll, (), (), wait)
-        ended = False
-        for _ in range(_MOST_CHUNKS):
-            try:
-                data = self._socket.recv(_CHUNK)
-            except BlockingIOError:
+        begin = self._clock()
+        while len(self._messages) < _MOST_MESSAGES:
+            spent = self._clock() - begin
+            if spent > (_BUDGET if self._messages else max(wait, _BUDGET)):
                 break
-            except OSError as error:
-                raise self._lost("is gone", str(error)) from error
-            if data:
-                self._protocol.receive_data(data)
-            else:
-                ended = True
-                self._protocol.receive_eof()
-            messages += self._messages(self._protocol.events_received())
-            self._answer_pings()
-            if ended:
-                break
-        closing = self._protocol.close_rcvd is not None or self._protocol.parser_exc is not None
-        if (ended or closing) and not messages:
-            raise self._lost("closed the connection")
+            if not self._unread and not self._fetch():
+                if self._messages or self._ended or spent >= wait:
+                    break
+                select.select(self._poll, (), (), wait - spent)
+                continue
+            self._protocol.receive_data(self._unread[:_SLICE])
+            self._unread = self._unread[_SLICE:]
+            self._take(self._protocol.events_received())
+        self._answer_pings()
+        messages, self._messages = self._messages[:_MOST_MESSAGES], self._messages[_MOST_MESSAGES:]
+        if not messages:
+            fault = self._protocol.parser_exc
+            if self._ended or self._protocol.close_rcvd is not None:
+                raise self._lost("closed the connection")
+            if fault is not None:
+                raise self._lost("sends what is no message of a device", f"{type(fault).__name__}: {fault}")
         return messages
+
+    def _fetch(self) -> bool:
+        """Take bytes from the socket, and return whether there were any."""
+        if self._ended:
+            return False
+        try:
+            self._unread = self._socket.recv(_CHUNK)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            raise self._lost("is gone", str(error)) from error
+        if not self._unread:
+            self._ended = True
+            self._protocol.receive_eof()
+        return bool(self._unread)
 
     def close(self) -> None:
         """Say goodbye, wait briefly until the other end has read all that was sent, and close; harmless when repeated.
@@ -157,24 +184,25 @@ class WebsocketChannel:
             pass
         self._socket.close()
 
-    def _messages(self, events: Sequence[object]) -> list[str]:
-        messages = []
+    def _take(self, events: Sequence[object]) -> None:
+        """Add the messages that end in these frames to those that wait to be received."""
         for frame in events:
             if getattr(frame, "opcode", None) in self._texts:
                 self._part += frame.data  # type: ignore[attr-defined]
                 if frame.fin:  # type: ignore[attr-defined]
-                    messages.append(bytes(self._part).decode("utf-8", "replace"))
+                    self._messages.append(bytes(self._part).decode("utf-8", "replace"))
                     self._part = b""
-        return messages
 
     def _answer_pings(self) -> None:
         with contextlib.suppress(OSError):  # the next message tells
             self._flush()
 
     def _flush(self) -> None:
-        for data in self._protocol.data_to_send():
-            if data:
-                self._socket.sendall(data)
+        """Send what is to be sent, as far as it is taken now; what is cut off goes first the next time."""
+        data = self._unsent + b"".join(self._protocol.data_to_send())
+        if data:
+            self._unsent = data  # stays, should sending fail
+            self._unsent = data[self._socket.send(data) :]
 
     def _failure(self, what: str, why: str = "") -> DeviceError:
         return DeviceError(f"{self._name} {what}.", why=why, fix=_REMEDY)

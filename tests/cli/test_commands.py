@@ -53,14 +53,49 @@ def test_a_file_name_that_can_not_name_a_study_is_refused(palpate, tmp_path):
     assert palpate("init", tmp_path / "-x y.toml").code == 2
 
 
-def test_init_does_not_overwrite(palpate, tmp_path):
+def test_init_replaces_a_study_where_that_is_asked_and_nothing_else(palpate, tmp_path):
     path = tmp_path / "study.toml"
-    path.write_text("mine", encoding="utf-8")
+    path.write_text("mine = 1\n", encoding="utf-8")
+    for more in ((), ("--force",)):
+        answer = palpate("init", path, *more)
+        assert answer.code == 2
+        assert "palpate did not write it" in answer.err
+        assert path.read_text(encoding="utf-8") == "mine = 1\n"
+    path.unlink()
+    assert palpate("init", path).code == 0
+    path.write_text(path.read_text(encoding="utf-8") + "a line that breaks it\n", encoding="utf-8")
     answer = palpate("init", path)
     assert answer.code == 2
     assert "exists already" in answer.err
-    assert path.read_text(encoding="utf-8") == "mine"
+    assert "--force" in answer.err
     assert palpate("init", path, "--force").code == 0
+    assert read_study(path).name == "study"
+
+
+@pytest.mark.parametrize("name", ["scan.xyz", "notes.txt", "model.palpate", "data.zarr", "scan", "scan.gz"])
+def test_only_a_toml_file_is_a_target_of_init(palpate, tmp_path, name):
+    path = tmp_path / name
+    for content in (None, b"mine"):
+        if content is not None:
+            path.write_bytes(content)
+        for more in ((), ("--force",)):
+            answer = palpate("init", path, *more)
+            assert answer.code == 2
+            assert "NAME.toml" in answer.err
+    assert path.read_bytes() == b"mine"
+
+
+def test_a_sample_that_does_not_exist_says_which_do(palpate, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer = palpate("init", "--sample", "liver.stl")
+    assert answer.code == 2
+    assert "kidney.stl" in answer.err
+    assert palpate("init", "--sample").code == 0
+    assert palpate("init", "--sample", "kidney").code == 2
+    assert palpate("init", "--sample", "kidney", "--force").code == 0
+    Path("kidney.stl").write_bytes(b"a scan")
+    assert palpate("init", "--sample", "--force").code == 2
+    assert Path("kidney.stl").read_bytes() == b"a scan"
 
 
 def test_schema_describes_every_key(palpate):

@@ -82,7 +82,7 @@ def test_fit_says_what_it_left_out_and_what_it_lacks(palpate, bench, learnt, tmp
         (("--force", "--outputs", "depth"), "is an input and an output"),
         (("--force", "--unit", "depth"), "no unit of a column"),
         (("--force", "--decimal", "."), "holds '"),
-        (("-o", tmp_path / "no" / "new.palpate"), "no folder"),
+        (("-o", tmp_path / "no" / "new.palpate"), "does not exist"),
     ):
         answer = palpate(*words, *more)
         assert (answer.code, said in " ".join(answer.err.split())) == (2, True), answer.err
@@ -130,7 +130,7 @@ def test_a_table_that_does_not_fit_the_model_is_refused(palpate, learnt, tmp_pat
         ("speed [mm/s],depth\n1,2\n", (), "line 1: column 'depth' has no unit; m is needed"),
         ("speed [mm/s],depth [N]\n1,2\n", (), "column 'depth' is in N; m is needed"),
         ("speed,depth [m]\n1,2\n", ("--at", "1,2"), "Give one of them"),
-        ("speed [m/s],depth [m]\n1,2\n", ("-o", new), "is what is asked"),
+        ("speed [m/s],depth [m]\n1,2\n", ("-o", new), "is a file that is read here"),
     ):
         new.write_text(text)
         answer = palpate("ask", learnt, "--table", new, *more)

@@ -330,7 +330,7 @@ def validate_model(
     text, target = f"{body}\n{validation}".lstrip(), path.with_suffix(".html") if report else None
     if target is not None:
         origin = getattr(data, "provenance", {})
-        write_report(
+        target = write_report(
             target, [Chapter(path.stem, model, data, validation, settings=model.meta, provenance=origin)]
         )
         text += f"\nreport: {target}"

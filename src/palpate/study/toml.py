@@ -17,6 +17,7 @@ from tomlkit.items import AoT
 
 from palpate.errors import StudyError
 from palpate.file_kinds import file_kind, way_for
+from palpate.output_files import STUDY_HEAD
 from palpate.study.body_records import BODIES
 from palpate.study.interaction_records import INTERACTIONS
 from palpate.study.quantities import Unit
@@ -152,7 +153,7 @@ def to_toml(study: Study, notes: Iterable[str] = ()) -> str:
         Lines of further comments for the head of the file.
     """
     document = tomlkit.document()
-    document.add(tomlkit.comment("A palpate study: what is solved, learnt, checked and touched."))
+    document.add(tomlkit.comment(STUDY_HEAD))
     document.add(tomlkit.comment('Quantities are numbers in SI units, or text with a unit: "5 mm", "2 GPa".'))
     for note in notes:
         document.add(tomlkit.comment(note) if note else tomlkit.nl())

@@ -22,9 +22,10 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
-from palpate.file_kinds import way_for
+from palpate.file_kinds import PART_FORMATS, part_ending, way_for
 from palpate.physics.advice import advise
 from palpate.physics.shapes.naming import require_known, require_name
+from palpate.physics.shapes.packed_file import plain_file, read_part, require_counts, require_file
 from palpate.physics.shapes.triangle_list import read_triangles
 from palpate.processes import is_supervised
 
@@ -70,7 +71,7 @@ def require_unit(unit: Any) -> None:
 def named_files(path: str) -> tuple[Path, ...]:
     """Files that are read together with a file: TetGen's others, those of an XDMF file's numbers, included ones."""
     file = Path(path)
-    ending = file.suffix.lower()
+    ending = part_ending(path)
     if ending in {".node", ".ele"}:
         return tuple(file.with_suffix(other) for other in (".node", ".ele", ".face") if other != ending)
     if ending not in _NAMED:
@@ -85,18 +86,12 @@ def digest_of(path: str) -> str:
     Raises
     ------
     UsageError
-        If there is no such file.
+        If there is no such file, or it is a folder or a device.
     FileFormatError
         If it is empty.
     """
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise UsageError(
-            f"The file {path} can't be read.",
-            why=f"{error.strerror}.",
-            fix="Check the path; a relative one starts from the directory of the running program.",
-        ) from error
+    require_file(path)
+    content = Path(path).read_bytes()
     if not content.strip():
         raise FileFormatError(
             f"The file {path} is empty.", why="It has no content.", fix="Export the shape again."
@@ -129,8 +124,8 @@ def tell_repairs(path: str, notes: Sequence[str]) -> None:
     )
 
 
-def read_with_meshio(path: str) -> Any:
-    """Read a file of a mesh.
+def read_with_meshio(path: str, content: bytes | None = None) -> Any:
+    """Read a file of a mesh, or this content in place of its own.
 
     Returns
     -------
@@ -147,13 +142,13 @@ def read_with_meshio(path: str) -> Any:
 
     import meshio
 
-    if Path(path).suffix.lower() not in meshio.extension_to_filetypes:
+    if part_ending(path) not in meshio.extension_to_filetypes:
         raise FileFormatError(
             f"{path} is in none of the formats of parts and meshes.",
             why=f"Its name ends in {Path(path).suffix or 'nothing'}.",
-            fix="Give STL or STEP (a surface or solids), or a mesh: VTU, VTK, MSH, INP, NAS, MED or XDMF. "
-            + way_for(path),
+            fix=f"Give {PART_FORMATS}. {way_for(path)}".strip(),
         )
+    require_counts(path, read_part(path))
     try:
         # Where no reader takes the file, meshio prints and ends the program. Its reader of STL takes four letters
         # of an ASCII file for a count, which may overflow: no harm.
@@ -162,8 +157,9 @@ def read_with_meshio(path: str) -> Any:
             contextlib.redirect_stdout(silent),
             contextlib.redirect_stderr(silent),
             np.errstate(over="ignore"),
+            plain_file(path, content=content) as plain,
         ):
-            mesh = meshio.read(path)
+            mesh = meshio.read(plain)
         mesh.said = silent.getvalue()
     except ImportError as error:
         package = error.name or "h5py"
@@ -184,6 +180,8 @@ def read_with_meshio(path: str) -> Any:
         OSError,
         EOFError,
         RuntimeError,
+        MemoryError,
+        OverflowError,
     ) as error:
         raise _unreadable(path, error) from error
     return mesh

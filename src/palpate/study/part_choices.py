@@ -178,7 +178,7 @@ def _picked(
 
 
 def _in_part(skin: BodyMesh, mask: np.ndarray, role: str) -> UsageError:
-    """Return the error of a pick that takes a face of a STEP file in part."""
+    """Return the error of a pick that takes a face of a CAD file in part."""
     numbers = np.unique(skin.surface_of[mask])
     part = next(n for n in numbers if not mask[skin.surface_of == n].all())
     return UsageError(

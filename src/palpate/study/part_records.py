@@ -49,7 +49,7 @@ class PartSurfaceRecord(Record):
     within: float = Field(WITHIN, gt=0, le=180, description="largest angle from that direction, degrees")
     triangles: str = Field(
         "",
-        description="triangles of the surface as it is read, as `palpate touch` writes them; not for STEP",
+        description="triangles of the surface as it is read, as `palpate touch` writes them; not for CAD files",
         examples=["0-17 25 40-80 of 5120"],
     )
 
@@ -126,7 +126,7 @@ class PartSurfaceRecord(Record):
 
 
 class PartRecord(Record):
-    """A part from a file: STL, STEP, or a volume mesh such as VTU, MSH or INP."""
+    """A part from a file: a surface such as STL or OBJ, CAD such as STEP, or a volume mesh such as VTU, MSH or INP."""
 
     INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "pad")
 

@@ -19,7 +19,8 @@ from palpate.errors import UsageError
 __all__ = ["detail_note", "least_element"]
 
 SHARES = (1 / 2, 1 / 4, 1 / 8, 1 / 16, 1 / 32)  # of the body's elements, that details are bounded to
-ENOUGH = 5_000  # triangles of a surface: some 20,000 elements, a minute of a solve
+ENOUGH = 2_000  # triangles of a surface: some 6,000 elements, seconds of a solve
+MORE = 1.3  # times as many triangles, from which on details and not the body's own curvature make them
 MOST = 100_000  # triangles of a surface beyond any solver
 AREA = 3**0.5 / 4  # of a triangle of edge 1
 PADDING = 1e-6  # of the part's length, by which a face's box takes the edges around it in
@@ -42,18 +43,19 @@ def least_element(solid: Any, coarse: float, grading: float) -> tuple[float, int
     UsageError
         If there are too many triangles with any size.
     """
-    least, count = SHARES[0] * coarse, 0
-    for share in SHARES:  # from the coarsest on, which are counted fastest
-        count = _triangles(solid, coarse, share * coarse, grading)
-        if count > ENOUGH:
-            break
-        least = share * coarse
-    if least == SHARES[0] * coarse and count > MOST:
+    least = SHARES[0] * coarse
+    count = _triangles(solid, coarse, least, grading)
+    if count > MOST:
         raise UsageError(
             f"The part would have about {float(f'{count:.1g}'):,.0f} triangles on its surface.",
             why=f"It has details far below the elements of {1e3 * coarse:.3g} mm, all over.",
             fix="Remove small fillets, threads and engravings in the CAD program, or choose larger elements.",
         )
+    for share in SHARES[1:]:  # from the coarsest on, which are counted fastest
+        before, count = count, _triangles(solid, coarse, share * coarse, grading)
+        if count > max(ENOUGH, MORE * before):
+            break
+        least = share * coarse
     return least, count
 
 

@@ -109,8 +109,10 @@ def require_sound(source: MeshSource) -> None:
                 why="The file is damaged or cut short.",
                 fix="Open it in the program that made it and export it again.",
             )
-    used = np.unique(np.concatenate([block.ravel() for _, block in source.solids])) if source.solids else []
-    bad = used[~np.isfinite(source.points[used]).all(axis=1)] if len(used) else []
+    used = np.unique(
+        np.concatenate([np.empty(0, dtype=np.int64), *(block.ravel() for _, block in source.solids)])
+    )
+    bad = used[~np.isfinite(source.points[used]).all(axis=1)]
     if len(bad):
         raise FileFormatError(
             f"{len(bad)} nodes of {source.path} have coordinates that are no finite numbers.",

@@ -260,7 +260,7 @@ def mesh_solid(
     for places, element in points:
         for place in places.tolist():
             geometry.RestrictH(Pnt(*place), element)
-    mesh = _generate(geometry, solid, coarse, minh=min([least, *(r.element / 2 for r in refinements)]))
+    mesh = _generate(geometry, solid, coarse, minh=min([least, *(r.element for r in refinements)]))
     if rename is not None:
         rename(mesh)
     return mesh

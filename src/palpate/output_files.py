@@ -168,7 +168,7 @@ def free_path(path: str | os.PathLike[str]) -> Path:
     """Return the path itself, or where somebody else's file has that name one with a number: ``NAME-2.html``."""
     wanted = Path(path)
     path, number = wanted, 1
-    while path.exists() and not (path.is_file() and is_marked(path)):
+    while path.is_file() and not is_marked(path):
         number += 1
         path = wanted.with_stem(f"{wanted.stem}-{number}")
     return path

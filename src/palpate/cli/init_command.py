@@ -44,7 +44,7 @@ def init_study(
         If the file exists and is not to be replaced, is a folder, or can't be read as a part.
     """
     if path.is_dir():
-        raise UsageError(f"{path} is a folder.", fix=f"Name a file, such as {path / 'study.toml'}.")
+        raise UsageError(f"{path} is a folder.", fix="Name the file of a part, or of a study, NAME.toml.")
     if sample:
         _write_sample(path, default=default, force=force)
         return
@@ -80,7 +80,7 @@ def part_line(notes: Sequence[str]) -> str:
 
 def _require_toml(path: Path) -> None:
     """Refuse a study file of another ending: the file may be one that somebody has, and holds no study."""
-    if path.suffix == ".toml":
+    if path.suffix.lower() == ".toml":
         return
     if kind := file_kind(path).replace("a study file", ""):
         raise UsageError(

@@ -319,6 +319,9 @@ def test_attributes_and_markers_of_tetgen(tmp_path: Path, first: int):
     shape = mesh_of(tmp_path / "a.ele")
     assert areas(shape)["surface 7"] == 1600
     assert len(shape.surfaces) == 6
+    for ending in ("node", "ele", "face"):
+        (tmp_path / f"a.{ending}").rename(tmp_path / f"A.{ending.upper()}")
+    assert areas(mesh_of(tmp_path / "A.ELE"))["surface 7"] == 1600
 
 
 def test_properties_of_nastran(tmp_path: Path):

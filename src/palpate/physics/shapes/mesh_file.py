@@ -154,7 +154,9 @@ def _without_volume(source: MeshSource) -> UsageError:
     """Return the error of a mesh that has no cells of volume, with its cause where the file shows it."""
     kinds = ", ".join(f"{count} of the kind {kind}" for kind, count in source.others.items()) or "none"
     why = f"Its cells are {kinds}; tetrahedra, hexahedra, wedges or pyramids are needed."
-    fix = "Export the volume mesh, or the closed surface as STL, OBJ or PLY: such a file is filled with elements."
+    fix = (
+        "Export the volume mesh, or the closed surface as STL, OBJ or PLY (for ImportedSolid): it is filled."
+    )
     named = ", ".join(dict.fromkeys(repr(group.name) for group in source.faces))
     if named and not source.regions:
         why += f" It has groups of surfaces alone ({named}), and some programs leave out what is in no group."

@@ -10,7 +10,6 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.file_kinds import part_ending
 from palpate.physics.apart import read_apart
 from palpate.physics.shapes.abaqus_file import read_abaqus
-from palpate.physics.shapes.body_file import named_files, read_with_meshio
+from palpate.physics.shapes.body_file import named_files, read_with_meshio, tetgen_file
 from palpate.physics.shapes.gmsh_file import is_gmsh_4, read_gmsh
 from palpate.physics.shapes.mesh_groups import FACES, SOLIDS, Group, MeshSource, require_sound
 from palpate.physics.shapes.naming import plain_name
@@ -339,14 +338,14 @@ def _name_properties(path: str, mesh: Any) -> None:
 
 def _tetgen_faces(path: str, mesh: Any) -> list[Group]:
     """Boundary markers from the .face file that TetGen writes beside a mesh."""
-    beside = Path(path).with_suffix(".face")
+    beside = tetgen_file(path, ".face")
     if not beside.exists():
         return []
     lines = [line.split("#")[0].split() for line in beside.read_text(encoding="utf-8").splitlines()]
     rows = [line for line in lines if line]
     if not rows or len(rows[0]) < 2 or int(rows[0][1]) == 0:
         return []
-    nodes = Path(path).with_suffix(".node").read_text(encoding="utf-8").splitlines()
+    nodes = tetgen_file(path, ".node").read_text(encoding="utf-8").splitlines()
     first = [line.split("#")[0].split() for line in nodes if line.split("#")[0].strip()][1]
     table = np.array([row[:5] for row in rows[1 : int(rows[0][0]) + 1]], dtype=np.int64)
     triangles, marks = table[:, 1:4] - int(first[0]), table[:, 4]

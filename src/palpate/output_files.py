@@ -149,18 +149,19 @@ def _require_own(path: Path, inputs: Iterable[str | os.PathLike[str]], *, overwr
             why="What is written would take its place.",
             fix="Choose another name with --out.",
         )
-    if is_own(path) or (overwrite and is_marked(path)):
+    marked = is_marked(path)
+    if is_own(path) or (overwrite and marked):
         return
-    if overwrite:
+    if marked:
         raise UsageError(
-            f"{path} exists already, and palpate did not write it.",
-            why="--force (in Python overwrite=True) replaces what palpate wrote, and nothing else.",
-            fix="Choose another name with --out, or remove the file yourself.",
+            f"{path} exists already.",
+            why="It is a table, or was changed after palpate wrote it.",
+            fix="Choose another name with --out, or replace it with --force (in Python overwrite=True).",
         )
     raise UsageError(
-        f"{path} exists already.",
-        why="It is not known as palpate's, or it was changed after palpate wrote it.",
-        fix="Choose another name with --out, or replace what palpate wrote with --force (in Python overwrite=True).",
+        f"{path} exists already, and palpate did not write it.",
+        why="Files of others are never replaced, with --force neither.",
+        fix="Choose another name with --out, or remove the file yourself.",
     )
 
 

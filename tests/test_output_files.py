@@ -35,7 +35,7 @@ FOREIGN = {
     **dict.fromkeys(("a.h", "a.md", "a.html", "a.toml", "a.vtu"), b"some text\n"),
     "a.glb": b"glTF\x02\0\0\0" + b'{"asset":{"generator":"a scanner"}}',
     "a.stl": b"a scan".ljust(84, b"\0"),
-    "a.palpate": b"some text\n",
+    "a.touch": b"some text\n",
     "a.svg": b"<svg/>",
     "a.fmu": b"PK",
 }

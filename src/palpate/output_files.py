@@ -30,7 +30,6 @@ __all__ = [
     "SAMPLE_HEAD",
     "STUDY_HEAD",
     "free_path",
-    "is_archive",
     "is_marked",
     "is_own",
     "picture_metadata",
@@ -212,10 +211,12 @@ def is_own(path: Path) -> bool:
         return all(name + function in content for function in (b"_hash", b"_limits", b"_deviation"))
     if ending in {".json", ".fmu"}:
         return _is_card(content) if ending == ".json" else _is_fmu(path)
-    return is_archive(content)
+    return ending == ".palpate" or _is_archive(
+        content
+    )  # nobody else has that ending, and a damaged one is no loss
 
 
-def is_archive(content: bytes) -> bool:
+def _is_archive(content: bytes) -> bool:
     """Return whether these are the bytes of a model file: an archive of safetensors whose header names palpate."""
     return content[8:9] == b"{" and b'"palpate":' in content[8 : 8 + int.from_bytes(content[:8], "little")]
 

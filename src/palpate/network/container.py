@@ -26,7 +26,7 @@ import numpy as np
 from palpate.errors import FileFormatError, UsageError
 from palpate.file_kinds import file_kind, way_for
 from palpate.files import write_file
-from palpate.output_files import is_archive
+from palpate.output_files import is_own
 
 __all__ = ["MAKE_ANEW", "Container", "read_container", "write_container"]
 
@@ -86,7 +86,7 @@ def write_container(path: str | os.PathLike[str], container: Container) -> Path:
     from safetensors.numpy import save
 
     target = Path(path)
-    if target.is_file() and target.stat().st_size and not is_archive(target.read_bytes()):
+    if target.is_file() and target.stat().st_size and not is_own(target):
         raise UsageError(
             f"{target} exists already, and palpate did not write it.",
             why="What was learnt would take its place.",

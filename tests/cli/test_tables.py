@@ -118,6 +118,9 @@ def test_all_rows_of_a_table_are_answered(palpate, learnt, tmp_path):
     assert "1 of 3 rows has no answer, a value is missing: line 3" in answer.err
     out = tmp_path / "out.csv"
     assert palpate("ask", learnt, "--table", new, "-o", out).code == 0
+    again = palpate("ask", learnt, "--table", new, "-o", out)
+    assert (again.code, "--force" in again.err) == (2, True)
+    assert palpate("ask", learnt, "--table", new, "-o", out, "--force").code == 0
     assert list(csv.reader(io.StringIO(out.read_text()))) == rows
     content = json.loads(palpate("ask", learnt, "--table", new, "--json").out)
     assert [one["line"] for one in content["answers"]] == [2, 4]

@@ -67,6 +67,20 @@ def test_every_format_in_any_case_and_packed(tmp_path: Path, name: str):
     assert volume_of(solid) == pytest.approx(VOLUME)
 
 
+@pytest.mark.parametrize("first", range(6))
+def test_polygons_that_are_not_convex_are_cut_within_themselves(tmp_path: Path, first: int):
+    """A prism of 20 mm over an L: three quarters of a square of 40 mm, each of its ends one polygon of six corners."""
+    outline = [(0, 0), (40, 0), (40, 20), (20, 20), (20, 40), (0, 40)]
+    lines = [f"v {x} {y} {z}" for z in (0, 20) for x, y in outline]
+    ends = [[6 + (k + first) % 6 for k in range(6)], [(5 - k + first) % 6 for k in range(6)]]
+    sides = [[k, (k + 1) % 6, 6 + (k + 1) % 6, 6 + k] for k in range(6)]
+    lines += ["f " + " ".join(f"{node + 1}/1/1" for node in face) for face in [*ends, *sides]]
+    (tmp_path / "a.obj").write_text("\n".join(lines))
+    solid = read(tmp_path / "a.obj")
+    assert volume_of(solid) == pytest.approx(24e-6)
+    assert sorted(solid.skin.areas.values()) == pytest.approx([400e-6] * 4 + [800e-6] * 2 + [1200e-6] * 2)
+
+
 def test_groups_of_an_obj_file_name_parts_of_its_surface(tmp_path: Path):
     faces = [f"f {' '.join(str(node + 1) for node in face)}" for face in BOX.faces]
     top = BOX.face_normals[:, 2] > 0.9

@@ -16,6 +16,7 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.file_kinds import part_ending
 from palpate.physics.shapes.naming import plain_name
 from palpate.physics.shapes.packed_file import read_part, require_counts
+from palpate.physics.shapes.polygon_faces import split_concave_polygons
 from palpate.physics.shapes.stl_text import parse_stl
 from palpate.physics.shapes.surface_repair import Surface
 from palpate.physics.shapes.vtk_file import read_polydata
@@ -66,6 +67,7 @@ def _read_scene(path: str, content: bytes, kind: str) -> list[tuple[str, np.ndar
     }.get(kind, {})
     more = {"skip_materials": True} if kind == "glb" else more
     try:
+        content = split_concave_polygons(content) if kind == "obj" else content
         scene = load_scene(io.BytesIO(content), file_type=kind, process=False, **more)
         parts = [(name, *scene.graph[name]) for name in scene.graph.nodes_geometry]
     except (

@@ -109,6 +109,9 @@ DAMAGED = {
     "words.obj": b"hello",
     "missing.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 1000000000\n",
     "nowhere.obj": b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    "star.obj": b"".join(b"v %d %d 0\n" % (k, k % 7) for k in range(9_000))
+    + b"f "
+    + b" ".join(b"%d" % k for k in range(1, 9_001)),
     "behind.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -9\n",
     "many.ply": PLY.format("ascii 1.0", 10**9, FACE).encode() + b"0 0 0\n",
     "few.ply": PLY.format("binary_little_endian 1.0", 90, FACE).encode() + bytes(100),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 __all__ = ["split_concave_polygons"]
 
+MOST = 256  # corners of a polygon: the work grows with their third power
 Point = tuple[float, float]
 
 
@@ -17,7 +18,7 @@ def split_concave_polygons(content: bytes) -> bytes:
     Raises
     ------
     ValueError, IndexError
-        If a coordinate or the number of a corner is none.
+        If a coordinate or the number of a corner is none, or such a polygon has more corners than `MOST`.
     """
     places: list[tuple[float, ...]] = []
     lines = content.split(b"\n")
@@ -31,6 +32,10 @@ def split_concave_polygons(content: bytes) -> bytes:
                 _turn(*three) < 0
                 for three in zip(flat, flat[1:] + flat[:1], flat[2:] + flat[:2], strict=True)
             ):
+                if len(flat) > MOST:
+                    raise ValueError(
+                        f"a polygon of {len(flat):,} corners is not convex; export it as triangles"
+                    )
                 ears = [b" ".join([b"f", *(words[1 + k] for k in ear)]) for ear in _ears(flat)]
                 lines[row] = b"\n".join(ears)
     return b"\n".join(lines)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 
 from palpate.errors import UsageError
-from palpate.output_files import is_own, require_outputs, with_seal
+from palpate.files import write_file
+from palpate.output_files import free_path, is_own, require_outputs, with_seal
 from palpate.surrogates.model_card import card_of
 
 
@@ -20,18 +23,55 @@ def test_a_text_is_its_own_until_a_letter_of_it_changes(tmp_path, name):
         assert is_own(file)
         require_outputs([file])
     written = with_seal(name, "some text\n")
-    for changed in (
-        "some text\n",
-        written.replace("some", "same"),
-        written + "more\n",
-        "more\n" + written,
-        "",
-    ):
+    for changed in (written.replace("some", "same"), written + "more\n", "more\n" + written):
         file.write_text(changed, "utf-8", newline="\n")
         assert not is_own(file)
         with pytest.raises(UsageError, match="exists already"):
             require_outputs([file])
         require_outputs([file], overwrite=True)
+
+
+FOREIGN = {
+    **dict.fromkeys(("a.h", "a.md", "a.html", "a.toml", "a.vtu"), b"some text\n"),
+    "a.glb": b"glTF\x02\0\0\0" + b'{"asset":{"generator":"a scanner"}}',
+    "a.stl": b"a scan".ljust(84, b"\0"),
+    "a.touch": b"some text\n",
+    "a.svg": b"<svg/>",
+    "a.fmu": b"PK",
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_nobody_elses_file_is_replaced_even_where_that_is_asked(tmp_path, name):
+    file = tmp_path / name
+    file.write_bytes(FOREIGN[name])
+    with pytest.raises(UsageError, match="palpate did not write it"):
+        require_outputs([file], overwrite=True)
+    assert free_path(file) == tmp_path / f"a-2{file.suffix}"
+
+
+def test_a_table_is_replaced_where_that_is_asked_unless_it_is_read(tmp_path):
+    table = tmp_path / "a.csv"
+    table.write_text("x,y\n1,2\n", "utf-8")
+    with pytest.raises(UsageError, match="exists already"):
+        require_outputs([table])
+    require_outputs([table], overwrite=True)
+    with pytest.raises(UsageError, match="is read here"):
+        require_outputs([table], inputs=[table], overwrite=True)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_pipe_stays_a_pipe_and_the_target_of_a_link_stays(tmp_path):
+    pipe, target, link = tmp_path / "pipe.csv", tmp_path / "target.csv", tmp_path / "link.csv"
+    os.mkfifo(pipe)
+    for attempt in (lambda: require_outputs([pipe], overwrite=True), lambda: write_file(pipe, "text")):
+        with pytest.raises(UsageError, match="a device, a pipe or a socket"):
+            attempt()
+    assert pipe.is_fifo()
+    target.write_text("mine", "utf-8")
+    link.symlink_to(target)
+    write_file(link, "text")
+    assert target.read_text("utf-8") == "mine"
 
 
 @pytest.mark.parametrize(

@@ -2,16 +2,47 @@
 
 from __future__ import annotations
 
+import contextlib
+import gzip
 import os
+import zlib
 from pathlib import Path
 
-__all__ = ["file_kind", "way_for"]
+__all__ = [
+    "CAD_ENDINGS",
+    "MESH_ENDINGS",
+    "PART_FORMATS",
+    "SURFACE_ENDINGS",
+    "file_kind",
+    "part_ending",
+    "part_kind",
+    "way_for",
+]
+
+SURFACE_ENDINGS = (".stl", ".obj", ".ply", ".off", ".glb", ".vtp")
+"""Ends of the names of files that hold a closed surface of triangles, which is filled with elements here."""
+
+CAD_ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
+"""Ends of the names of files of the CAD kernel, which hold solids, or faces to be sewn into one."""
+
+MESH_ENDINGS = (
+    *(".vtu", ".vtk", ".msh", ".mesh", ".meshb", ".inp", ".bdf", ".nas", ".fem", ".xdmf", ".xmf"),
+    *(".node", ".ele", ".med", ".exo", ".e", ".h5m", ".avs", ".su2", ".f3grid", ".ugrid"),
+)
+"""Ends of the names of files that hold a volume mesh, which keeps its elements."""
+
+PART_FORMATS = (
+    "a surface (STL, OBJ, PLY, OFF, GLB, VTP), solids (STEP, IGES, BREP), or a volume mesh (VTU, VTK, MSH, INP, BDF, "
+    "MED, XDMF and others), each also as NAME.gz"
+)
+"""Formats of parts, in words for a message."""
+
+_HEAD = 1024  # bytes in which a legacy VTK file says what it holds
 
 _TABLES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".parquet", ".npz", ".npy", ".json")
-_PARTS = (".stl", ".step", ".stp", ".msh", ".vtu", ".inp")
 _KINDS = {
     **dict.fromkeys(_TABLES, "a file of data"),
-    **dict.fromkeys(_PARTS, "a part"),
+    **dict.fromkeys((*SURFACE_ENDINGS, *CAD_ENDINGS, *MESH_ENDINGS), "a part"),
     ".palpate": "a model file",
     ".zarr": "a dataset of solves",
     ".toml": "a study file",
@@ -27,7 +58,27 @@ _WAYS = {
 
 def file_kind(path: str | os.PathLike[str]) -> str:
     """Return what a file is by its name's ending, such as "a study file"; "" for an ending that tells nothing."""
-    return _KINDS.get(Path(path).suffix.lower(), "")
+    return _KINDS.get(part_ending(path), "")
+
+
+def part_ending(path: str | os.PathLike[str]) -> str:
+    """Return the end of a name in small letters, without a last ``.gz``: ``.stl`` of Part.STL.gz."""
+    name = Path(path)
+    return Path(name.stem).suffix.lower() if name.suffix.lower() == ".gz" else name.suffix.lower()
+
+
+def part_kind(path: str | os.PathLike[str]) -> str:
+    """Return what a part's file holds: "surface", "cad" or "mesh"; "" for a name that is no part's.
+
+    Of legacy VTK files, which hold either, the first lines tell it.
+    """
+    ending = part_ending(path)
+    if ending == ".vtk" and Path(path).is_file():
+        opener = gzip.open if Path(path).suffix.lower() == ".gz" else open
+        with contextlib.suppress(OSError, EOFError, zlib.error), opener(path, "rb") as file:
+            return "surface" if b"POLYDATA" in file.read(_HEAD).upper() else "mesh"
+    kinds = {"surface": SURFACE_ENDINGS, "cad": CAD_ENDINGS, "mesh": MESH_ENDINGS}
+    return next((kind for kind, endings in kinds.items() if ending in endings), "")
 
 
 def way_for(path: str | os.PathLike[str]) -> str:

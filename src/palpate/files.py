@@ -29,6 +29,7 @@ from palpate.errors import PalpateError, ResourceError, UsageError
 __all__ = [
     "TemporaryFolder",
     "explain_system_error",
+    "require_regular",
     "system_errors",
     "write_file",
     "writing",
@@ -75,6 +76,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
         try:
             if target.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+            require_regular(target)
             yield part
             _synchronise(part)
             os.replace(part, target)
@@ -95,6 +97,22 @@ def write_file(path: str | os.PathLike[str], content: bytes | str) -> Path:
     with writing(path) as part:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
     return Path(path)
+
+
+def require_regular(path: Path) -> None:
+    """Refuse to put a file in the place of a device, a pipe or a socket; what is no longer there is no fault.
+
+    Raises
+    ------
+    UsageError
+        If something other than a file or a folder has that name.
+    """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise UsageError(
+            f"{path} is a device, a pipe or a socket.",
+            why="A file would take its place.",
+            fix="Name a file.",
+        )
 
 
 @contextlib.contextmanager

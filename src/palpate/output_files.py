@@ -1,13 +1,15 @@
 """Files that are written for other tools: where they may go, and which of those that are there may be replaced.
 
-An export replaces what an earlier export wrote and nobody changed since. Anything else stays, unless its user says
-otherwise. Texts end with a line that holds a checksum of all above it; other formats name palpate in their own
-metadata. Tables have no such place, and are never replaced unasked.
+An export replaces what an earlier export wrote and nobody changed since. With ``--force`` it replaces what palpate
+wrote and somebody changed, and tables. Nobody else's file is ever replaced. Texts end with a line that holds a checksum
+of all above it, a study begins with a line of palpate's; other formats name palpate in their own metadata. Tables have
+no such place, and are never replaced unasked.
 
 ::
 
     require_outputs   refuses names that can't be written to, or whose files are not palpate's to replace
-    sealed            a text with the line that lets a later export replace it
+    free_path         a name beside somebody else's file, where refusing would lose a result
+    with_seal         a text with the line that lets a later export replace it
 """
 
 from __future__ import annotations
@@ -16,13 +18,33 @@ import hashlib
 import json
 import os
 import re
+import tomllib
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 
 from palpate.errors import UsageError
+from palpate.files import require_regular
 
-__all__ = ["is_own", "require_outputs", "seal", "with_seal"]
+__all__ = [
+    "SAMPLE_HEAD",
+    "STUDY_HEAD",
+    "free_path",
+    "is_marked",
+    "is_own",
+    "picture_metadata",
+    "require_outputs",
+    "seal",
+    "with_seal",
+]
+
+STUDY_HEAD = "A palpate study: what is solved, learnt, checked and touched."
+"""First comment of each study file that palpate writes."""
+
+SAMPLE_HEAD = b"sample part of palpate"
+"""Begin of the sample part, which `palpate init --sample` writes."""
+
+PICTURE_MARK = "palpate"  # program that pictures name in their metadata
 
 _COMMENTS = {
     ".h": ("/* ", " */"),
@@ -30,6 +52,7 @@ _COMMENTS = {
     ".cs": ("// ", ""),
     ".py": ("# ", ""),
     ".txt": ("# ", ""),
+    ".toml": ("# ", ""),
     ".m": ("% ", ""),
     **dict.fromkeys((".md", ".html", ".htm", ".pvd", ".vtu"), ("<!-- ", " -->")),
 }
@@ -38,8 +61,23 @@ _COMMENTS = {
 _SENTENCE = "Written by palpate; the next export replaces this file unless it was changed. Checksum "
 _LAST_LINE = re.compile(rb"[^\n]*" + re.escape(_SENTENCE.encode()) + rb"([0-9a-f]{16})[^\n]*\n\Z")
 _LONGEST_LINE = 200
-_BINARY_HEADS = {".glb": b'"generator":"palpate"', ".onnx": b"\x12\x07palpate"}  # its field producer_name
+_ACTING = {
+    "interaction",
+    "loads",
+    "probe",
+}  # what a study has one of, the latter two in files of version 0.1.0
 _LIBRARIES = {".so", ".dylib", ".dll"}
+_TABLES = {".csv", ".parquet", ".nc", ".npz"}  # formats without a place for a mark
+# what names palpate in other formats, and in how many bytes from the start
+_MARKS = {
+    ".glb": (b'"generator":"palpate"', 256),
+    ".onnx": (b"\x12\x07palpate", 256),  # its field producer_name
+    ".stl": (SAMPLE_HEAD, 80),
+    # where Matplotlib puts the program that it is told
+    ".svg": (f"<dc:title>{PICTURE_MARK}</dc:title>".encode(), None),
+    ".png": (b"Software\0" + PICTURE_MARK.encode(), None),
+    ".pdf": (f"/Creator ({PICTURE_MARK})".encode(), None),
+}
 
 
 def require_outputs(
@@ -47,6 +85,7 @@ def require_outputs(
     *,
     endings: tuple[str, ...] = (),
     folder: str | os.PathLike[str] | None = None,
+    inputs: Iterable[str | os.PathLike[str]] = (),
     overwrite: bool = False,
 ) -> None:
     """Refuse files that can't be written, or that are there and are not palpate's to replace.
@@ -59,14 +98,16 @@ def require_outputs(
         Endings of which each file has one, such as ``".fmu"``; by default any.
     folder : path, optional
         Folder of the files that the export makes itself; by default the files lie in folders that exist.
+    inputs : iterable of path
+        Files that are read: none of them is replaced.
     overwrite : bool
-        True replaces files whatever they are.
+        True also replaces tables, and files of palpate's that somebody changed.
 
     Raises
     ------
     UsageError
-        If an ending is another one, a folder stands where a file goes or the reverse, the folder around is missing,
-        or a file exists that no export wrote or that was changed since.
+        If an ending is another one, a folder or a device stands where a file goes or the reverse, the folder around is
+        missing, or a file exists that is not to be replaced.
     """
     paths = [Path(file) for file in files]
     place = None if folder is None else Path(folder)
@@ -94,12 +135,43 @@ def require_outputs(
                 why=f"{path if place is None else place} goes into it.",
                 fix="Make it first, or choose another place with --out.",
             )
-        if not overwrite and path.exists() and not is_own(path):
-            raise UsageError(
-                f"{path} exists already.",
-                why="It is not known as palpate's, or it was changed after palpate wrote it.",
-                fix="Choose another name with --out, or replace it with --force (in Python overwrite=True).",
-            )
+        require_regular(path)
+        if path.exists():
+            _require_own(path, inputs, overwrite=overwrite)
+
+
+def _require_own(path: Path, inputs: Iterable[str | os.PathLike[str]], *, overwrite: bool) -> None:
+    """Refuse to replace a file that is read, that palpate did not write, or that was changed and is not given up."""
+    if any(path.samefile(file) for file in map(Path, inputs) if file.exists()):
+        raise UsageError(
+            f"{path} is a file that is read here.",
+            why="What is written would take its place.",
+            fix="Choose another name with --out.",
+        )
+    marked = is_marked(path)
+    if is_own(path) or (overwrite and marked):
+        return
+    if marked:
+        raise UsageError(
+            f"{path} exists already.",
+            why="It is a table, or was changed after palpate wrote it.",
+            fix="Choose another name with --out, or replace it with --force (in Python overwrite=True).",
+        )
+    raise UsageError(
+        f"{path} exists already, and palpate did not write it.",
+        why="Files of others are never replaced, with --force neither.",
+        fix="Choose another name with --out, or remove the file yourself.",
+    )
+
+
+def free_path(path: str | os.PathLike[str]) -> Path:
+    """Return the path itself, or where somebody else's file has that name one with a number: ``NAME-2.html``."""
+    wanted = Path(path)
+    path, number = wanted, 1
+    while path.is_file() and not is_marked(path):
+        number += 1
+        path = wanted.with_stem(f"{wanted.stem}-{number}")
+    return path
 
 
 def with_seal(file: str | os.PathLike[str], text: str) -> str:
@@ -131,14 +203,48 @@ def is_own(path: Path) -> bool:
     if ending in _COMMENTS:
         line = _LAST_LINE.search(content, max(0, len(content) - _LONGEST_LINE))
         return line is not None and line[1].decode() == _checksum(content[: line.start()])
-    if ending in _BINARY_HEADS:
-        return _BINARY_HEADS[ending] in content[:256]
+    if ending in _MARKS:
+        mark, span = _MARKS[ending]
+        return mark in content[:span]
     if ending in _LIBRARIES:  # which exports the functions of that name
         name = path.stem.removeprefix("lib").encode()
         return all(name + function in content for function in (b"_hash", b"_limits", b"_deviation"))
-    if ending == ".json":
-        return _is_card(content)
-    return ending == ".fmu" and _is_fmu(path)
+    if ending in {".json", ".fmu"}:
+        return _is_card(content) if ending == ".json" else _is_fmu(path)
+    return ending == ".palpate" or _is_archive(
+        content
+    )  # nobody else has that ending, and a damaged one is no loss
+
+
+def _is_archive(content: bytes) -> bool:
+    """Return whether these are the bytes of a model file: an archive of safetensors whose header names palpate."""
+    return content[8:9] == b"{" and b'"palpate":' in content[8 : 8 + int.from_bytes(content[:8], "little")]
+
+
+def picture_metadata(path: str | os.PathLike[str]) -> dict[str, str] | None:
+    """Return the metadata by which a picture that Matplotlib writes is known as palpate's; None in other formats."""
+    key = {".svg": "Creator", ".pdf": "Creator", ".png": "Software"}.get(Path(path).suffix.lower())
+    return None if key is None else {key: PICTURE_MARK}
+
+
+def is_marked(path: Path) -> bool:
+    """Return whether palpate wrote a file, whatever became of it since; of a table it is taken for granted."""
+    ending = path.suffix.lower()
+    if ending == ".toml":
+        return path.read_bytes().lstrip().startswith(f"# {STUDY_HEAD}".encode()) or _is_study(path)
+    if ending in _COMMENTS:
+        return _SENTENCE.encode() in path.read_bytes()
+    return ending in _TABLES or is_own(path)
+
+
+def _is_study(path: Path) -> bool:
+    """Return whether a file has the tables of a study, or the line of a file that palpate wrote."""
+    content = path.read_bytes()
+    try:
+        tables = tomllib.loads(content.decode())
+    except ValueError:
+        return _SENTENCE.encode() in content
+    return _SENTENCE.encode() in content or bool("name" in tables and _ACTING & tables.keys())
 
 
 def _checksum(content: bytes) -> str:

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import warnings
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 from palpate import __version__
+from palpate.cli.console import Console
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.loading import load
@@ -53,14 +55,90 @@ def test_a_file_name_that_can_not_name_a_study_is_refused(palpate, tmp_path):
     assert palpate("init", tmp_path / "-x y.toml").code == 2
 
 
-def test_init_does_not_overwrite(palpate, tmp_path):
+def test_init_replaces_a_study_where_that_is_asked_and_nothing_else(palpate, tmp_path):
     path = tmp_path / "study.toml"
-    path.write_text("mine", encoding="utf-8")
+    path.write_text("mine = 1\n", encoding="utf-8")
+    for more in ((), ("--force",)):
+        answer = palpate("init", path, *more)
+        assert answer.code == 2
+        assert "palpate did not write it" in answer.err
+        assert path.read_text(encoding="utf-8") == "mine = 1\n"
+    path.unlink()
+    assert palpate("init", path).code == 0
+    path.write_text(path.read_text(encoding="utf-8") + "a line that breaks it\n", encoding="utf-8")
     answer = palpate("init", path)
     assert answer.code == 2
     assert "exists already" in answer.err
-    assert path.read_text(encoding="utf-8") == "mine"
+    assert "--force" in answer.err
     assert palpate("init", path, "--force").code == 0
+    assert read_study(path).name == "study"
+
+
+@pytest.mark.parametrize("name", ["scan.xyz", "notes.txt", "model.palpate", "data.zarr", "scan", "scan.gz"])
+def test_only_a_toml_file_is_a_target_of_init(palpate, tmp_path, name):
+    path = tmp_path / name
+    for content in (None, b"mine"):
+        if content is not None:
+            path.write_bytes(content)
+        for more in ((), ("--force",)):
+            answer = palpate("init", path, *more)
+            assert answer.code == 2
+            assert "NAME.toml" in answer.err
+    assert path.read_bytes() == b"mine"
+
+
+def test_a_sample_that_does_not_exist_says_which_do(palpate, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer = palpate("init", "--sample", "liver.stl")
+    assert answer.code == 2
+    assert "kidney.stl" in answer.err
+    assert palpate("init", "--sample").code == 0
+    assert palpate("init", "--sample", "kidney").code == 2
+    assert palpate("init", "--sample", "kidney", "--force").code == 0
+    Path("kidney.stl").write_bytes(b"a scan")
+    assert palpate("init", "--sample", "--force").code == 2
+    assert Path("kidney.stl").read_bytes() == b"a scan"
+
+
+FIELD = Path(__file__).parents[1] / "data" / "field"
+
+
+def test_a_scan_gets_its_study_beside_it_and_stays_as_it_is(palpate, tmp_path):
+    scan = Path(shutil.copy(FIELD / "surface" / "quad_cube.obj", tmp_path / "Cube.OBJ"))
+    before = scan.read_bytes()
+    for more in ((), ("--force",)):
+        answer = palpate("init", scan, *more)
+        assert answer.code == 0
+        assert "numbers taken as mm: 40 × 40 × 40 mm" in answer.out
+    assert scan.read_bytes() == before
+    assert read_study(tmp_path / "Cube.toml").name == "Cube"
+
+
+def test_the_unit_is_asked_for_where_two_are_possible(palpate, tmp_path):
+    part = Path(shutil.copy(FIELD / "stl" / "cube4mm.stl", tmp_path))
+    for words in (("init", part), ("touch", part, "--no-view")):
+        answer = palpate(*words)
+        assert answer.code == 2
+        assert "4 mm and 4 m are both possible" in answer.err
+        assert "--unit mm" in answer.err
+    assert "numbers taken as mm: 4 × 4 × 4 mm" in palpate("init", part, "--unit", "mm").out
+
+
+def test_a_part_does_not_go_on_with_the_study_of_another(palpate, tmp_path):
+    scan = Path(shutil.copy(FIELD / "surface" / "quad_cube.obj", tmp_path))
+    assert palpate("init", scan).code == 0
+    answer = palpate("touch", scan.with_suffix(".stl"), "--no-view")
+    assert answer.code == 2
+    assert "is no study of quad_cube.stl" in answer.err
+
+
+def test_what_takes_long_is_told(monkeypatch):
+    lines, heard = [], threading.Event()
+    monkeypatch.setattr("palpate.cli.console.PATIENCE", 0.0)
+    monkeypatch.setattr(Console, "say", lambda console, text: (lines.append(text), heard.set()))
+    with Console().patience("Reading part.step"):
+        assert heard.wait(60)
+    assert lines == ["Reading part.step …"]
 
 
 def test_schema_describes_every_key(palpate):

@@ -209,7 +209,7 @@ def test_what_can_not_be_is_refused_with_its_reason(palpate, folder):
         assert said in answer.err
         assert not out.exists()
     answer = palpate("correct", model_, "--file", folder / "bad.csv", "--out", folder / "no" / "new.touch")
-    assert (answer.code, "no folder" in answer.err) == (2, True)
+    assert (answer.code, "does not exist" in answer.err) == (2, True)
     assert palpate("correct", folder / "bad.csv", "--stdin", "--out", out).code == 2
     silent = palpate("correct", model_, "--port", "0", "--wait", "0.1", "--out", out)
     assert (silent.code, "Nobody connected" in silent.err) == (3, True)

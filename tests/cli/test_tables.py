@@ -82,7 +82,7 @@ def test_fit_says_what_it_left_out_and_what_it_lacks(palpate, bench, learnt, tmp
         (("--force", "--outputs", "depth"), "is an input and an output"),
         (("--force", "--unit", "depth"), "no unit of a column"),
         (("--force", "--decimal", "."), "holds '"),
-        (("-o", tmp_path / "no" / "new.palpate"), "no folder"),
+        (("-o", tmp_path / "no" / "new.palpate"), "does not exist"),
     ):
         answer = palpate(*words, *more)
         assert (answer.code, said in " ".join(answer.err.split())) == (2, True), answer.err
@@ -118,6 +118,9 @@ def test_all_rows_of_a_table_are_answered(palpate, learnt, tmp_path):
     assert "1 of 3 rows has no answer, a value is missing: line 3" in answer.err
     out = tmp_path / "out.csv"
     assert palpate("ask", learnt, "--table", new, "-o", out).code == 0
+    again = palpate("ask", learnt, "--table", new, "-o", out)
+    assert (again.code, "--force" in again.err) == (2, True)
+    assert palpate("ask", learnt, "--table", new, "-o", out, "--force").code == 0
     assert list(csv.reader(io.StringIO(out.read_text()))) == rows
     content = json.loads(palpate("ask", learnt, "--table", new, "--json").out)
     assert [one["line"] for one in content["answers"]] == [2, 4]
@@ -130,7 +133,7 @@ def test_a_table_that_does_not_fit_the_model_is_refused(palpate, learnt, tmp_pat
         ("speed [mm/s],depth\n1,2\n", (), "line 1: column 'depth' has no unit; m is needed"),
         ("speed [mm/s],depth [N]\n1,2\n", (), "column 'depth' is in N; m is needed"),
         ("speed,depth [m]\n1,2\n", ("--at", "1,2"), "Give one of them"),
-        ("speed [m/s],depth [m]\n1,2\n", ("-o", new), "is what is asked"),
+        ("speed [m/s],depth [m]\n1,2\n", ("-o", new), "is a file that is read here"),
     ):
         new.write_text(text)
         answer = palpate("ask", learnt, "--table", new, *more)

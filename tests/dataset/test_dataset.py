@@ -145,6 +145,12 @@ def test_overwriting_spares_what_is_no_store(tmp_path):
     (tmp_path / "thesis" / "chapter1.tex").write_text("…", encoding="utf-8")
     with pytest.raises(UsageError):
         make().save(tmp_path / "thesis", overwrite=True)
+    # a Zarr store of another program
+    (tmp_path / "thesis" / "zarr.json").write_text(
+        '{"zarr_format": 3, "node_type": "group"}', encoding="utf-8"
+    )
+    with pytest.raises(UsageError, match="no dataset of palpate"):
+        make().save(tmp_path / "thesis", overwrite=True)
     assert (tmp_path / "thesis" / "chapter1.tex").exists()
     assert len(list(tmp_path.iterdir())) == 1
 

@@ -20,7 +20,7 @@ from palpate.cli.material_commands import material_app
 from palpate.cli.number_options import count_option, number_option
 from palpate.cli.sweep_command import sweep
 from palpate.cli.table_commands import correct, fit
-from palpate.cli.table_options import Json, with_table_options
+from palpate.cli.table_options import Force, Json, with_table_options
 from palpate.cli.touch_command import touch
 from palpate.cli.touch_options import DeadMan, Device, NoController, Unsoftened
 from palpate.cli.trace_commands import replay, trace_app
@@ -138,7 +138,8 @@ def init(
     path: Annotated[
         Path,
         typer.Argument(
-            help="File to write. Or a part (STL, STEP, VTU, MSH, INP and others): its study is written beside it."
+            help="File to write, NAME.toml. Or a part (STL, OBJ, STEP, VTU, MSH, INP and others): its study is written "
+            "beside it."
         ),
     ] = STUDY,
     preset: Annotated[
@@ -148,12 +149,18 @@ def init(
         ),
     ] = "beam-nylon",
     unit: Annotated[
-        str | None, typer.Option(help="For a part: unit of the file's numbers. Default: mm, or what fits.")
+        str | None,
+        typer.Option(
+            help="For a part: unit of the file's numbers. Default: mm, or m where only that fits; asked for where "
+            "both fit."
+        ),
     ] = None,
     sample: Annotated[
-        bool, typer.Option("--sample", help="Write a part to try: a kidney-like organ, such as kidney.stl.")
+        bool, typer.Option("--sample", help="Write a part to try: a kidney-like organ, kidney.stl.")
     ] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a study, or a sample, that palpate wrote; nothing else.")
+    ] = False,
     show: Annotated[bool, typer.Option("--print", help="Print the study instead of writing a file.")] = False,
 ) -> None:
     """Write a study file with a comment for every key: of a named study, or of a part."""
@@ -303,6 +310,7 @@ def ask(
         Path | None,
         typer.Option("-o", "--out", help="For --table: file for the answers, as CSV. Default: stdout."),
     ] = None,
+    force: Force = False,
     reading: Any = None,
     as_json: Json = False,
 ) -> None:
@@ -318,7 +326,7 @@ def ask(
         raise UsageError("Places come from --at or from --table.", fix="Give one of them.")
     from palpate.cli.ask_table import ask_table
 
-    ask_table(model, table, out, Console(as_json), reading)
+    ask_table(model, table, out, Console(as_json), reading, force=force)
 
 
 @app.command()

@@ -19,6 +19,7 @@ from palpate.format import by_number, count
 from palpate.learning import Fitted
 from palpate.learning.loading import load
 from palpate.network import Network
+from palpate.output_files import require_outputs
 from palpate.surrogates import Surrogate
 from palpate.tables import Table, read_table
 from palpate.units import Range
@@ -27,7 +28,13 @@ __all__ = ["ask_table"]
 
 
 def ask_table(
-    model: Path, path: Path, out: Path | None, console: Console, reading: Mapping[str, Any]
+    model: Path,
+    path: Path,
+    out: Path | None,
+    console: Console,
+    reading: Mapping[str, Any],
+    *,
+    force: bool = False,
 ) -> None:
     """Answer for all rows of a table, in its order; the answers go to a file or to stdout.
 
@@ -43,6 +50,8 @@ def ask_table(
         Takes notes and results.
     reading : mapping
         How the table is written, as `palpate.tables.read_table` takes it.
+    force : bool
+        True to replace a table that exists.
 
     Raises
     ------
@@ -57,8 +66,8 @@ def ask_table(
             f"{model} holds a {type(contents).__name__}, which does not answer at a place.",
             fix="Ask a network of arrays, or a body that is pressed or gripped.",
         )
-    if out is not None and out.exists() and (out.samefile(path) or out.samefile(model)):
-        raise UsageError(f"{out} is what is asked.", fix="Choose another name for the answers.")
+    if out is not None:
+        require_outputs([out], endings=(".csv",), inputs=(path, model), overwrite=force)
     inputs = inputs_of(contents)
     table = read_table(path, **reading)
     X = _inputs(table, inputs, model)

@@ -6,6 +6,8 @@ import contextlib
 import json
 import math
 import sys
+import threading
+import time
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -14,6 +16,8 @@ from typing import Any
 from palpate.errors import PalpateError
 
 __all__ = ["Console", "advice_in_words"]
+
+PATIENCE, AGAIN = 2.0, 30.0  # s after which a user hears what takes so long, and then hears of it again
 
 
 @contextlib.contextmanager
@@ -51,6 +55,26 @@ class Console:
         """Print one line of progress to stderr."""
         if not self.as_json:
             print(text, file=sys.stderr, flush=True)  # noqa: T201
+
+    @contextlib.contextmanager
+    def patience(self, doing: str) -> Iterator[None]:
+        """Say what is being done once it has taken two seconds, and every half minute how long it has taken."""
+        began, done = time.monotonic(), threading.Event()
+
+        def tell() -> None:
+            wait = PATIENCE
+            while not done.wait(wait):
+                taken = time.monotonic() - began
+                self.say(f"{doing} …" if wait == PATIENCE else f"{doing} … {taken:.0f} s so far")
+                wait = AGAIN
+
+        thread = threading.Thread(target=tell, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            done.set()
+            thread.join()
 
     def result(self, text: str, content: Mapping[str, Any]) -> None:
         """Print the result of a command to stdout."""

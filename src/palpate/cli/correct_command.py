@@ -22,6 +22,7 @@ from palpate.learning.correction import (
     correct,
     summarise_correction,
 )
+from palpate.output_files import require_outputs
 from palpate.surrogates import Surrogate
 from palpate.units import parse_quantity
 
@@ -103,8 +104,8 @@ def correct_model(
         )
     values = _parameters(body, parameters)
     notes: list[str] = []
-    if not out.absolute().parent.is_dir():  # before anything is measured
-        raise UsageError(f"There is no folder for {out}.", fix="Choose a folder that exists.")
+    read = [] if source.file is None else [source.file]
+    require_outputs([out], inputs=read)  # before anything is measured
     if source.file is not None:
         measured = read_measurements(source.file, missing=source.missing, **(source.options or {}))
         notes = list(measured.notes)

@@ -13,6 +13,7 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning import fit
 from palpate.learning.automatic import ranges_of
+from palpate.output_files import require_outputs
 from palpate.tables import Table, read_table
 from palpate.units import Quantity, Range
 
@@ -73,12 +74,12 @@ def fit_table(
         If a column is missing, or there is nothing to learn from.
     """
     out = path.with_suffix(".palpate") if out is None else out
-    if out.exists() and (not force or out.samefile(path)):
+    if out.exists() and not force:
         raise UsageError(
-            f"{out} exists already.", fix="Choose another name with -o, or replace it with --force."
+            f"{out} exists already.", fix="Choose another name with -o, or replace a model with --force."
         )
-    if not out.absolute().parent.is_dir():  # before anything is learnt
-        raise UsageError(f"There is no folder for {out}.", fix="Choose a folder that exists.")
+    # before anything is learnt
+    require_outputs([out], endings=(".palpate",), inputs=[path], overwrite=force)
     table = read_table(path, **reading)
     inputs = _names(table, columns.inputs, "inputs")
     outputs = _names(table, columns.outputs, "outputs")

@@ -60,7 +60,8 @@ def improve_file(
     from palpate.study import read_study
     from palpate.study.run import Paths
 
-    record = read_study(file).with_workers(workers)
+    with console.patience(f"Reading {file}"):
+        record = read_study(file).with_workers(workers)
     paths = Paths(file.parent, record.name)
     options: dict[str, Any] = {"cluster": scheduler, "case_limit": case_limit}
     if samples is not None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import typer
 
+from palpate.cli.console import Console
 from palpate.errors import UsageError
-from palpate.file_kinds import file_kind, way_for
-from palpate.files import write_file
+from palpate.file_kinds import PART_FORMATS, file_kind, way_for
+from palpate.files import require_regular, write_file
+from palpate.output_files import is_marked
 
-__all__ = ["init_study"]
+__all__ = ["init_study", "part_line"]
 
 
 def init_study(
@@ -31,34 +34,31 @@ def init_study(
     sample : bool
         Whether to write the sample part to the path.
     force : bool
-        Whether to replace a file that exists.
+        Whether to replace a file that palpate wrote.
     show : bool
         Whether to print the study instead.
 
     Raises
     ------
     UsageError
-        If the file exists, is a folder or can't be read as a part.
+        If the file exists and is not to be replaced, is a folder, or can't be read as a part.
     """
-    from palpate.study import preset_study, to_toml
-    from palpate.study.part_records import CAD_ENDINGS, MESH_ENDINGS
-    from palpate.study.part_study import part_study, part_text, study_file
-
     if path.is_dir():
-        raise UsageError(f"{path} is a folder.", fix=f"Name a file, such as {path / 'study.toml'}.")
+        raise UsageError(f"{path} is a folder.", fix="Name the file of a part, or of a study, NAME.toml.")
     if sample:
-        _write_sample(path, force=force)
+        _write_sample(path, default=default, force=force)
         return
-    if path.suffix.lower() in (*CAD_ENDINGS, *MESH_ENDINGS):
-        record, notes = part_study(path, unit=unit)
-        text = part_text(record, notes)
-        target = study_file(path)
+    from palpate.study import preset_study, to_toml
+
+    said = ""
+    if file_kind(path) == "a part":
+        from palpate.study.part_study import part_study, part_text, study_file
+
+        with Console().patience(f"Reading {path}"):
+            record, notes = part_study(path, unit=unit)
+        text, target, said = part_text(record, notes), study_file(path), f"{part_line(notes)}\n"
     else:
-        if (kind := file_kind(path)) not in ("", "a study file"):
-            raise UsageError(
-                f"A study file can't be called {path}: that is the name of {kind}.",
-                fix=f"Name the study NAME.toml, or a part. {way_for(path)}",
-            )
+        _require_toml(path)
         if unit is not None:
             raise UsageError("A unit belongs to a part.", fix="Name the part's file, or leave out --unit.")
         record, target = preset_study(preset), path
@@ -70,18 +70,54 @@ def init_study(
         return
     _require_free(target, force=force)
     write_file(target, text)
-    typer.echo(f"{target}: a study called {record.name}. Next: palpate sweep {target}")
+    typer.echo(f"{said}{target}: a study called {record.name}. Next: palpate sweep {target}")
 
 
-def _write_sample(path: Path, *, force: bool) -> None:
+def part_line(notes: Sequence[str]) -> str:
+    """Return the line about a part that says its size, and in which unit its numbers were taken."""
+    return next(note for note in notes if note)
+
+
+def _require_toml(path: Path) -> None:
+    """Refuse a study file of another ending: the file may be one that somebody has, and holds no study."""
+    if path.suffix.lower() == ".toml":
+        return
+    if kind := file_kind(path).replace("a study file", ""):
+        raise UsageError(
+            f"A study file can't be called {path}: that is the name of {kind}.",
+            fix=f"Name the study NAME.toml, or a part. {way_for(path)}",
+        )
+    raise UsageError(
+        f"{path} is neither a part that can be read nor the name of a study.",
+        why=f"Its name ends in {path.suffix or 'nothing'}. Parts are {PART_FORMATS}.",
+        fix="Name the study NAME.toml, or export the part in one of these formats.",
+    )
+
+
+def _write_sample(path: Path, *, default: bool, force: bool) -> None:
     from palpate.physics.shapes.sample_part import write_sample_part
 
-    path = Path("kidney.stl") if path == Path("study.toml") else path
+    path = Path("kidney.stl") if default else path.with_suffix(".stl") if not path.suffix else path
+    if path.stem != "kidney" or path.suffix != ".stl":
+        raise UsageError(
+            f"There is no sample part called {path.name}.",
+            why="There is one: kidney.stl, a kidney-like organ.",
+            fix=f"Name {path.with_name('kidney.stl')}, or leave the name out.",
+        )
     _require_free(path, force=force)
     write_sample_part(path)
     typer.echo(f"{path}: a kidney-like organ, 5,120 triangles, in mm. Next: palpate init {path}")
 
 
 def _require_free(path: Path, *, force: bool) -> None:
-    if path.exists() and not force:
+    """Refuse to write over a file, unless palpate wrote it and it is given up."""
+    require_regular(path)
+    if not path.exists() or (force and is_marked(path)):
+        return
+    if is_marked(path):
         raise UsageError(f"{path} exists already.", fix="Choose another name, or replace it with --force.")
+    raise UsageError(
+        f"{path} exists already, and palpate did not write it.",
+        why="It does not begin as what `palpate init` writes, and has not the tables of a study.",
+        fix="Choose another name, or remove the file yourself.",
+    )

@@ -11,8 +11,9 @@ import typer
 
 from palpate.cli.console import Console
 from palpate.cli.number_options import number_option
-from palpate.cli.table_options import Json, with_table_options
+from palpate.cli.table_options import Force, Json, with_table_options
 from palpate.errors import UsageError
+from palpate.output_files import require_outputs, with_seal
 
 if TYPE_CHECKING:
     from palpate.tables import Table
@@ -100,6 +101,7 @@ def fit(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="File for the material as a table of a study file.")
     ] = None,
+    force: Force = False,
     reading: Any = None,
     as_json: Json = False,
 ) -> None:
@@ -107,6 +109,10 @@ def fit(
     tables = SpecimenTables(files, test or [], measure, column or [], reading)
     sizes = {"radius": radius, "thickness": thickness, "width": width}
     options = {"law": law, "poisson": poisson, "weight": weight, "margin": margin, "ramp": ramp}
+    outputs = [file for file in (plot, out) if file is not None]
+    require_outputs(outputs, inputs=files, overwrite=force)
+    if out is not None:
+        require_outputs([out], endings=(".toml",), overwrite=force)
     fit_material(tables, options, sizes, plot, out, Console(as_json))
 
 
@@ -279,7 +285,7 @@ def fit_material(
     if plot is not None:
         found.plot(plot)
     if out is not None:
-        write_file(out, found.toml())
+        write_file(out, with_seal(out, found.toml()))
     content = found.describe() | {"toml": found.toml()}
     console.result(f"{found}\n\n{found.toml()}".rstrip(), content)
 

@@ -69,7 +69,8 @@ def sweep_file(
     from palpate.study.run import Paths, sweep_study
     from palpate.sweeps import Scheduler
 
-    record = read_study(study).with_workers(workers).with_samples(samples)
+    with console.patience(f"Reading {study}"):
+        record = read_study(study).with_workers(workers).with_samples(samples)
     paths = Paths(study.parent, record.name)
     began = time.monotonic()
     if paths.data.with_name(paths.data.name + ".parts").exists():
@@ -163,7 +164,8 @@ def learn_file(study: Path, console: Console, *, watch: bool = False) -> None:
     )
     from palpate.study.study_advice import earlier_curve
 
-    record = read_study(study)
+    with console.patience(f"Reading {study}"):
+        record = read_study(study)
     paths = Paths(study.parent, record.name)
     train, test = load_data(record, paths)
     console.say(f"Learning from {len(train)} {'solves' if record.memory is None else 'histories'} …")
@@ -214,7 +216,8 @@ def validate_study_file(study: Path, report: bool, console: Console, traces: Seq
     from palpate.study.study_advice import advice_after
     from palpate.validation.report.body_words import solid_words
 
-    record = read_study(study)
+    with console.patience(f"Reading {study}"):
+        record = read_study(study)
     paths = Paths(study.parent, record.name)
     train, test = load_data(record, paths)
     model, history = load_model(paths, train)
@@ -330,7 +333,7 @@ def validate_model(
     text, target = f"{body}\n{validation}".lstrip(), path.with_suffix(".html") if report else None
     if target is not None:
         origin = getattr(data, "provenance", {})
-        write_report(
+        target = write_report(
             target, [Chapter(path.stem, model, data, validation, settings=model.meta, provenance=origin)]
         )
         text += f"\nreport: {target}"

@@ -16,7 +16,10 @@ __all__ = ["Force", "Json", "MissingOption", "column_list", "with_table_options"
 
 Json = Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")]
 Force = Annotated[
-    bool, typer.Option("--force", help="Replace files that exist and that no export of palpate wrote.")
+    bool,
+    typer.Option(
+        "--force", help="Replace tables, and files of palpate's that were changed since; never others."
+    ),
 ]
 MissingOption = Annotated[
     str, typer.Option("--missing", help="Rows in which a value is missing: leave-out or refuse.")

@@ -12,6 +12,7 @@ import typer
 from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Json
 from palpate.errors import UsageError
+from palpate.file_kinds import PART_FORMATS
 
 if TYPE_CHECKING:
     from palpate.cli.console import Console
@@ -22,9 +23,12 @@ __all__ = ["touch"]
 
 
 def touch(
-    part: Annotated[Path, typer.Argument(help="Part: STL, STEP, VTU, MSH, INP and others.")],
+    part: Annotated[Path, typer.Argument(help="Part: STL, OBJ, STEP, VTU, MSH, INP and others.")],
     unit: Annotated[
-        str | None, typer.Option(help="Unit of the file's numbers. Default: mm, or what fits.")
+        str | None,
+        typer.Option(
+            help="Unit of the file's numbers. Default: mm, or m where only that fits; else it is asked."
+        ),
     ] = None,
     young: Annotated[str | None, typer.Option(help="Young's modulus. Default: 10 kPa.")] = None,
     poisson: Annotated[
@@ -78,7 +82,7 @@ def touch(
         from palpate.cli.touch_page import TouchedPart, touch_on_page
 
         if not part.is_file():
-            raise UsageError(f"There is no file {part}.", fix="Name the part: STL, STEP, or a volume mesh.")
+            raise UsageError(f"There is no file {part}.", fix=f"Name {PART_FORMATS}.")
         notes: list[str] = []
         touch_on_page(
             part.stem,
@@ -107,7 +111,8 @@ def _study_on_page(
     file = study_file(part)
     if file.exists():
         return _study_of(part, options, console), file, True
-    study, held = part_study(part, **_in_si(options))
+    with console.patience(f"Reading {part}"):
+        study, held = part_study(part, **_in_si(options))
     notes[:] = held
     console.say("\n".join(filter(None, notes)))
     console.say(f"{_chosen(study)} Change it on the page, and press start there.")
@@ -144,7 +149,8 @@ def _study_of(part: Path, options: dict[str, Any], console: Console) -> Study:
     options = _in_si(options)
     file = study_file(part)
     if file.exists():
-        study = read_study(file)
+        with console.patience(f"Reading {file} and {part}"):
+            study = read_study(file)
         said = _choices_of(study)
         if others := [name for name, value in options.items() if not _are_equal(said.get(name), value)]:
             raise UsageError(
@@ -152,13 +158,26 @@ def _study_of(part: Path, options: dict[str, Any], console: Console) -> Study:
                 why=f"It says otherwise of {', '.join('--' + name for name in others)}.",
                 fix="Change the file and leave the options out, or delete it with its solves.",
             )
+        _require_part(study, file, part)
         console.say(f"Going on with the study {file} …")
         return study
-    study, notes = part_study(part, **options)
+    with console.patience(f"Reading {part}"):
+        study, notes = part_study(part, **options)
     write_file(file, part_text(study, notes))
     console.say("\n".join(filter(None, notes)))
     console.say(f"{_chosen(study)} {file} says all of it; change it there.")
     return study
+
+
+def _require_part(study: Study, file: Path, part: Path) -> None:
+    """Refuse a study that lies beside a part under its name, and is one of another part."""
+    other = getattr(study.body, "file", None)
+    if other is None or Path(other).name != part.name:
+        raise UsageError(
+            f"{file} exists already, and is no study of {part.name}.",
+            why=f"It is one of {'another body' if other is None else Path(other).name}.",
+            fix="Rename the part, or the study with its files.",
+        )
 
 
 def _choices_of(study: Study) -> dict[str, Any]:

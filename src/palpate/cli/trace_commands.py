@@ -12,6 +12,7 @@ from palpate.cli.console import Console
 from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
+from palpate.output_files import require_outputs
 
 if TYPE_CHECKING:
     import numpy as np
@@ -221,17 +222,20 @@ def plot(
         Path | None, typer.Option(help="Dataset of solves (.zarr); those beside the stroke are drawn too.")
     ] = None,
     model: ModelOption = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Draw force and depth in time, and the force by depth, beside the finite elements' solves where they are given."""
     from palpate.validation.report.trace_pictures import plot_trace, save_figure
 
     console = Console(as_json)
+    target = out or file.with_suffix(".svg")
+    require_outputs([target], inputs=[file], overwrite=force)
     trace = _read(file, console)
     if not len(trace):
         raise UsageError(f"{file.name} holds no tick.", why=" ".join(trace.notes))
     solved, apart = (None, 0.0) if data is None else _beside_solves(trace, data, model)
-    path = save_figure(out or file.with_suffix(".svg"), lambda: plot_trace(trace, solved))
+    path = save_figure(target, lambda: plot_trace(trace, solved))
     words = (
         ""
         if solved is None
@@ -284,10 +288,13 @@ def compare(
         ),
     ] = 200,
     out: Picture = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Compare a trace with another one, another model, or the full model; differences in what a person notices."""
     console = Console(as_json)
+    if out is not None:
+        require_outputs([out], inputs=[file], overwrite=force)
     trace = _read(file, console)
     if sum(value is not None for value in (other, model, full_model)) != 1:
         raise UsageError(

@@ -47,10 +47,11 @@ def write(data: xarray.Dataset, path: Path, *, overwrite: bool) -> Path:
             why="It holds something else than the dataset to be saved.",
             fix="Save under another name, delete it, or pass overwrite=True.",
         )
-    if path.exists() and not (path / "zarr.json").is_file():
+    head = path / "zarr.json"
+    if path.exists() and not (head.is_file() and FORMAT.encode() in head.read_bytes()):
         raise UsageError(
             f"{path} won't be overwritten.",
-            why="It is no Zarr store.",
+            why="It is no dataset of palpate.",
             fix="Save under another name, or delete it yourself.",
         )
     stamped = data.assign_attrs(checksum=_checksum(data))

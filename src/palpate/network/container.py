@@ -23,9 +23,10 @@ from typing import Any
 
 import numpy as np
 
-from palpate.errors import FileFormatError
+from palpate.errors import FileFormatError, UsageError
 from palpate.file_kinds import file_kind, way_for
 from palpate.files import write_file
+from palpate.output_files import is_own
 
 __all__ = ["MAKE_ANEW", "Container", "read_container", "write_container"]
 
@@ -78,13 +79,20 @@ def write_container(path: str | os.PathLike[str], container: Container) -> Path:
     Raises
     ------
     UsageError
-        If the folder does not exist.
+        If the folder does not exist, or a file of that name is no archive of palpate's.
     ResourceError
         If the disk is full, or the folder write-protected.
     """
     from safetensors.numpy import save
 
-    return write_file(path, save(dict(container.tensors), container.header))
+    target = Path(path)
+    if target.is_file() and target.stat().st_size and not is_own(target):
+        raise UsageError(
+            f"{target} exists already, and palpate did not write it.",
+            why="What was learnt would take its place.",
+            fix="Choose another name, or remove the file yourself.",
+        )
+    return write_file(target, save(dict(container.tensors), container.header))
 
 
 def read_container(path: str | os.PathLike[str]) -> Container:

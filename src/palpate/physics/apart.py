@@ -63,7 +63,7 @@ def read_apart(function: Callable[..., Result], *arguments: Any, doing: str) -> 
     except ChildEnded as error:
         raise SolverError(
             f"A child process ended while {doing}: {error.reason}.",
-            why="Surfaces that touch or cut themselves, and details far below the element size, can crash the mesher.",
+            why="Damaged files, surfaces that touch or cut themselves, and details far below the elements can do that.",
             fix="Repair the surface and unite touching bodies in the program that made the file, or change `element`.",
         ) from error
 

@@ -18,6 +18,7 @@ from numba import njit
 
 from palpate.errors import UsageError
 from palpate.files import writing
+from palpate.output_files import picture_metadata
 from palpate.physics import deformed
 from palpate.physics.deformed import Ball, NodalField
 
@@ -58,7 +59,7 @@ class Picture:
         target = Path(path)
         try:
             with writing(target) as part:
-                self.figure.savefig(part)
+                self.figure.savefig(part, metadata=picture_metadata(target))
         except ValueError as error:
             raise UsageError(
                 f"Could not write {target}.", why=str(error), fix="Write to NAME.png, .pdf, .svg or .jpg."

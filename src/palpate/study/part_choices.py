@@ -68,7 +68,7 @@ def shown_part(study: Study) -> ShownPart:
             depth=acting.depth[1],
         ),
         units=tuple(UNITS) if body.unit else (),
-        whole=bool(getattr(bare, "is_step", False)),
+        whole=bool(getattr(bare, "is_cad", False)),
         materials={name: _about(name) for name in MATERIALS if _is_for_solids(name)},
         laws=LAWS,
         notes=tuple(bare.notes),
@@ -129,7 +129,7 @@ def _names(body: PartRecord) -> np.ndarray:
     bare, patches = body.bare(), body.patches()
     skin = bare.skin
     middles = skin.points[skin.triangles].mean(axis=1)
-    if getattr(bare, "is_step", False):  # whole faces are named by their centres
+    if getattr(bare, "is_cad", False):  # whole faces are named by their centres
         faces = FacePatches(skin.surfaces, np.array([face.centre for face in bare.faces]), patches)
         return np.array(faces.labels(skin.surface_of, middles, skin.normals), dtype=object)
     names, index = apply_patches(skin.surfaces, skin.surface_of, middles, patches, skin.normals)
@@ -164,7 +164,7 @@ def _picked(
         name, faces = _free_name(role, skin), _whole_faces(skin, mask)
         surfaces = [surface for surface in surfaces if surface["name"] != name]
         if mask.any():
-            if not faces and getattr(body.bare(), "is_step", False):
+            if not faces and getattr(body.bare(), "is_cad", False):
                 raise _in_part(skin, mask, role)
             listed = (
                 {"faces": faces} if faces else {"triangles": triangle_text(np.flatnonzero(mask), len(mask))}
@@ -178,12 +178,12 @@ def _picked(
 
 
 def _in_part(skin: BodyMesh, mask: np.ndarray, role: str) -> UsageError:
-    """Return the error of a pick that takes a face of a STEP file in part."""
+    """Return the error of a pick that takes a face of a CAD file in part."""
     numbers = np.unique(skin.surface_of[mask])
     part = next(n for n in numbers if not mask[skin.surface_of == n].all())
     return UsageError(
         f"Of {skin.surfaces[part]} only a part is {role}.",
-        why="Faces of a STEP file are picked whole; the study's own choice of what faces up may cut them.",
+        why="Faces of a CAD file are picked whole; the study's own choice of what faces up may cut them.",
         fix=f"Click that face until all of it is {role}, or none; or choose by `facing` in the study file.",
     )
 

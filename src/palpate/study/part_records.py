@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from palpate.errors import UsageError
+from palpate.file_kinds import part_kind
 from palpate.physics import Body, ImportedMesh, ImportedSolid, SurfacePatch
 from palpate.physics.shapes.body_file import FEATURE_ANGLE, WITHIN
 from palpate.physics.shapes.naming import require_name
@@ -15,17 +15,7 @@ from palpate.physics.shapes.triangle_list import read_triangles
 from palpate.records import Metres, Number, Record
 from palpate.study.material_records import SolidMaterial, build_material
 
-__all__ = ["CAD_ENDINGS", "MESH_ENDINGS", "PartRecord", "PartSurfaceRecord", "part_shape"]
-
-STEP_ENDINGS = (".step", ".stp")
-CAD_ENDINGS = (*STEP_ENDINGS, ".stl")
-"""Ends of the names of files that hold a surface or solids, which are meshed here."""
-
-MESH_ENDINGS = (
-    *(".vtu", ".vtk", ".msh", ".mesh", ".meshb", ".inp", ".bdf", ".nas", ".fem", ".xdmf", ".xmf"),
-    *(".node", ".ele", ".med", ".exo", ".e", ".h5m", ".avs", ".su2", ".f3grid", ".ugrid"),
-)
-"""Ends of the names of files that hold a volume mesh, which keeps its elements."""
+__all__ = ["PartRecord", "PartSurfaceRecord", "part_shape"]
 
 _DIRECTIONS: dict[str, tuple[float, float, float]] = {
     "up": (0.0, 0.0, 1.0),
@@ -59,7 +49,7 @@ class PartSurfaceRecord(Record):
     within: Number = Field(WITHIN, gt=0, le=180, description="largest angle from that direction, degrees")
     triangles: str = Field(
         "",
-        description="triangles of the surface as it is read, as `palpate touch` writes them; not for STEP",
+        description="triangles of the surface as it is read, as `palpate touch` writes them; not for CAD files",
         examples=["0-17 25 40-80 of 5120"],
     )
 
@@ -136,14 +126,14 @@ class PartSurfaceRecord(Record):
 
 
 class PartRecord(Record):
-    """A part from a file: STL, STEP, or a volume mesh such as VTU, MSH or INP."""
+    """A part from a file: a surface such as STL or OBJ, CAD such as STEP, or a volume mesh such as VTU, MSH or INP."""
 
     INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "pad")
 
     kind: Literal["part"] = "part"
     file: str = Field(min_length=1, description="beside the study file", examples=["part.stl"])
     unit: Literal["m", "dm", "cm", "mm", "um", "in"] | None = Field(
-        None, description="of the file's numbers; a STEP file states its own", examples=["mm"]
+        None, description="of the file's numbers; STEP and IGES files state their own", examples=["mm"]
     )
     element: Metres | None = Field(
         None,
@@ -155,7 +145,7 @@ class PartRecord(Record):
         None,
         gt=0,
         le=180,
-        description=f"STL: from which angle on an edge is sharp, degrees; left out: {FEATURE_ANGLE:g}",
+        description=f"surfaces: from which angle on an edge is sharp, degrees; left out: {FEATURE_ANGLE:g}",
         examples=[FEATURE_ANGLE],
     )
     material: SolidMaterial | None = Field(
@@ -172,11 +162,11 @@ class PartRecord(Record):
             raise ValueError("two surfaces share a name")
         if sum(surface.is_rest for surface in self.surfaces) > 1:
             raise ValueError("two surfaces have no bounds; one alone can be what the others leave")
-        ending = Path(self.file).suffix.lower()
-        if self.element is not None and ending not in CAD_ENDINGS:
+        kind = part_kind(self.file)
+        if self.element is not None and kind == "mesh":
             raise ValueError(f"{self.file} is a mesh and keeps its elements: leave out element")
-        if self.feature_angle is not None and ending != ".stl":
-            raise ValueError("feature_angle is for STL files")
+        if self.feature_angle is not None and kind != "surface":
+            raise ValueError("feature_angle is for surfaces, such as STL files")
         regions = self.shape().regions  # its errors say more than a line of a list
         for region in self.materials:
             if region not in regions:
@@ -240,18 +230,18 @@ def part_shape(
     feature_angle: float | None = None,
     patches: tuple[SurfacePatch, ...] = (),
 ) -> ImportedSolid | ImportedMesh:
-    """Return the shape of a part's file: a solid of STEP or STL, else a volume mesh.
+    """Return the shape of a part's file: a solid of CAD or a surface, else a volume mesh.
 
     Parameters
     ----------
     file : str
         Path of the file; its ending tells the format.
     unit : str, optional
-        Unit of its numbers; a STEP file states its own, a mesh is in m by default.
+        Unit of its numbers; STEP and IGES files state their own, a mesh is in m by default.
     element : float, optional
-        Largest element in m, of a STEP or STL file.
+        Largest element in m, of a solid or a surface.
     feature_angle : float, optional
-        Angle in degrees from which on an edge of an STL file is sharp.
+        Angle in degrees from which on an edge of a surface is sharp.
     patches : tuple of SurfacePatch
         Names for parts of the surface.
 
@@ -260,7 +250,7 @@ def part_shape(
     UsageError, FileFormatError
         If the file is missing, empty or of another format, or its unit is.
     """
-    if Path(file).suffix.lower() not in CAD_ENDINGS:
+    if part_kind(file) not in ("cad", "surface"):
         return ImportedMesh(file, unit or "m", patches)
     angle = FEATURE_ANGLE if feature_angle is None else feature_angle
     return ImportedSolid(file, unit, element, patches, angle)

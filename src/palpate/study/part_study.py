@@ -14,9 +14,11 @@ from pydantic import ValidationError
 
 from palpate import checks
 from palpate.errors import PalpateError, UsageError
+from palpate.file_kinds import PART_FORMATS, part_ending, part_kind, way_for
+from palpate.physics.shapes.cad_file import states_unit
 from palpate.physics.shapes.mesh import Face
 from palpate.record_complaints import complaints
-from palpate.study.part_records import CAD_ENDINGS, STEP_ENDINGS, PartRecord, part_shape
+from palpate.study.part_records import PartRecord, part_shape
 from palpate.study.study import Study
 from palpate.study.toml import to_toml
 
@@ -24,7 +26,7 @@ __all__ = ["part_study", "part_text", "study_file"]
 
 HELD, TOUCHED = "held", "touched"
 YOUNG, POISSON = 10e3, 0.45  # Pa; of soft tissue, until the user says what it is
-SMALL = 5e-3  # m: a part that would be smaller in mm was probably drawn in m
+SMALL = 5e-3  # m: a part that would be smaller in mm may have been drawn in m
 FLAT, LEVEL = (
     0.999,
     0.02,
@@ -60,9 +62,9 @@ def part_study(
     Parameters
     ----------
     file : path
-        STL, STEP or a volume mesh.
+        A surface, solids or a volume mesh.
     unit : str, optional
-        Unit of the file's numbers. By default mm, or m where the part would be smaller than 5 mm.
+        Unit of the file's numbers. By default mm, or m where mm can't be; between 1 and 5 in numbers it has to be said.
     young, poisson : float
         Young's modulus in Pa, and Poisson's ratio.
     radius, depth : float, optional
@@ -75,9 +77,15 @@ def part_study(
     Raises
     ------
     UsageError, FileFormatError
-        If the file is missing, or no body, or a choice does not suit it.
+        If the file is missing, or no body, a choice does not suit it, or its unit has to be said.
     """
     path = Path(file)
+    if not part_kind(path):
+        raise UsageError(
+            f"{path} is in none of the formats of parts and meshes.",
+            why=f"Its name ends in {part_ending(path) or 'nothing'}.",
+            fix=f"Give {PART_FORMATS}. {way_for(path)}".strip(),
+        )
     for what, length in (("The radius of the ball", radius), ("The depth of the ball", depth)):
         if length is not None:
             checks.positive(what, length, "m")
@@ -94,7 +102,7 @@ def part_study(
     if held:
         fixed, named = tuple(held), []
     content: dict[str, Any] = {
-        "name": _study_name(path.stem),
+        "name": _study_name(_stem(path)),
         "body": {
             "kind": "part",
             "file": str(path),
@@ -129,7 +137,7 @@ def _suit(study: Study, content: dict[str, Any], element: float) -> Study:
     skin, acting = study.body.shape().skin, content["interaction"]
     corners = skin.points[skin.triangles_of(acting["touches"])]
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    kept = float(np.median(edges)) if Path(study.body.file).suffix.lower() not in CAD_ENDINGS else 0.0
+    kept = float(np.median(edges)) if part_kind(study.body.file) == "mesh" else 0.0
     changes: dict[str, Any] = {}
     if element < kept <= acting["radius"]:
         changes["sweep"] = content["sweep"] | {"element": _nice(1.1 * kept)}
@@ -158,18 +166,24 @@ def part_text(study: Study, notes: Iterable[str]) -> str:
 
 def _read(path: Path, unit: str | None) -> tuple[str | None, Sequence[Face]]:
     """Return the unit, and the faces of the part."""
-    if path.suffix.lower() in STEP_ENDINGS or unit is not None:
+    if unit is not None or states_unit(path):
         return unit, part_shape(str(path), unit).faces
     try:
         faces = part_shape(str(path), "mm").faces
-        if max(np.ptp([face.lower, face.upper], axis=0).max() for face in faces) >= SMALL:
-            return "mm", faces
     except UsageError as error:
         try:
             return "m", part_shape(str(path), "m").faces
         except PalpateError:
             raise error from None
-    return "m", part_shape(str(path), "m").faces
+    low = np.min([face.lower for face in faces], axis=0)
+    length = float((np.max([face.upper for face in faces], axis=0) - low).max())
+    if length >= SMALL:
+        return "mm", faces
+    raise UsageError(
+        f"The longest side of {path} is {1e3 * length:.4g} in its numbers; their unit is not known.",
+        why=f"The file does not state it: {1e3 * length:.4g} mm and {1e3 * length:.4g} m are both possible.",
+        fix="Say it: --unit mm, or --unit m, cm, dm, in or um.",
+    )
 
 
 def _support(faces: Sequence[Face], low: float, height: float) -> tuple[str | tuple[str, ...], list[Any]]:
@@ -223,7 +237,12 @@ def _study_of(content: dict[str, Any]) -> Study:
 
 def study_file(part: str | os.PathLike[str]) -> Path:
     """Return the path of the study of a part: beside it, under a name that its files can have."""
-    return Path(part).with_name(f"{_study_name(Path(part).stem)}.toml")
+    return Path(part).with_name(f"{_study_name(_stem(Path(part)))}.toml")
+
+
+def _stem(part: Path) -> str:
+    """Return the name of a part's file without its endings: body of body.stl.gz."""
+    return Path(part.stem).stem if part.suffix.lower() == ".gz" else part.stem
 
 
 def _study_name(stem: str) -> str:

@@ -34,8 +34,9 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import PalpateError
+from palpate.file_kinds import part_kind
 from palpate.processes import available_cores, end_by_sigterm, end_group
-from palpate.study.part_records import CAD_ENDINGS, PartRecord
+from palpate.study.part_records import PartRecord
 from palpate.study.run import Paths
 from palpate.study.stage_records import ProbeSweepRecord
 from palpate.study.study import Study
@@ -56,7 +57,7 @@ def rough_study(study: Study) -> Study | None:
     body, acting = study.body, study.interaction
     if not (isinstance(body, PartRecord) and isinstance(study.sweep, ProbeSweepRecord)):
         return None
-    if Path(body.file).suffix.lower() not in CAD_ENDINGS:
+    if part_kind(body.file) == "mesh":
         return None
     sweep = study.sweep.model_copy(update={"element": getattr(acting, "radius", None)})
     return study.model_copy(update={"name": f"{study.name}-rough", "sweep": sweep})

@@ -16,6 +16,7 @@ from tomlkit.items import AoT
 
 from palpate.errors import StudyError
 from palpate.file_kinds import file_kind, way_for
+from palpate.output_files import STUDY_HEAD
 from palpate.record_complaints import complaints, unit_in
 from palpate.study.study import Study
 from palpate.units import parse_quantity
@@ -160,7 +161,7 @@ def to_toml(study: Study, notes: Iterable[str] = ()) -> str:
         Lines of further comments for the head of the file.
     """
     document = tomlkit.document()
-    document.add(tomlkit.comment("A palpate study: what is solved, learnt, checked and touched."))
+    document.add(tomlkit.comment(STUDY_HEAD))
     document.add(tomlkit.comment('Quantities are numbers in SI units, or text with a unit: "5 mm", "2 GPa".'))
     for note in notes:
         document.add(tomlkit.comment(note) if note else tomlkit.nl())

@@ -86,7 +86,7 @@ class ShownPart:
     units : tuple of str
         Units in which the file's numbers could be taken instead.
     whole : bool
-        Whether faces can be picked as a whole only, as those of a STEP file.
+        Whether faces can be picked as a whole only, as those of a CAD file.
     materials : mapping of name to words
         Materials that can be asked for by name, and what there is to say of each.
     laws : tuple of str

@@ -10,7 +10,7 @@ import trimesh
 
 from palpate.errors import UsageError
 from palpate.physics.shapes import ImportedSolid
-from palpate.physics.shapes.stl_file import read_stl
+from palpate.physics.shapes.filled_surface import read_surface
 from palpate.physics.shapes.surface_checks import closest_points, surface_gap
 from palpate.physics.shapes.surface_repair import Surface
 from palpate.physics.shapes.surface_simplify import simplify_surface
@@ -83,11 +83,11 @@ def test_borders_of_labels_stay():
 def test_large_files_are_simplified_and_told(tmp_path: Path):
     ball = trimesh.creation.icosphere(subdivisions=5, radius=50)
     ball.export(path := tmp_path / "ball.stl")
-    topology, surface = read_stl(path, "mm")
+    topology, surface = read_surface(path, "mm")
     assert len(topology.faces) == len(surface.triangles) <= 20_000
     assert topology.volume == pytest.approx(ball.volume * 1e-9, rel=1e-4)
     assert "20,480 triangles were simplified to" in surface.notes[0]
-    assert len(read_stl(path, "mm", 0.0)[0].faces) == 20_480
+    assert len(read_surface(path, "mm", 0.0)[0].faces) == 20_480
     described = ImportedSolid(path, unit="mm", simplify=0.0).describe()
     assert described["simplify"] == 0
     with pytest.raises(UsageError, match="simplified"):

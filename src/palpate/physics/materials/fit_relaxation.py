@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.format import number
+from palpate.output_files import picture_metadata
 from palpate.physics.materials.prony import PronySeries
 from palpate.physics.materials.specimen_tests import columns_of_numbers
 
@@ -128,7 +129,7 @@ class RelaxationFit:
         axes.legend(frameon=False)
         axes.grid(alpha=0.3)
         if path is not None:
-            figure.savefig(path, dpi=150)
+            figure.savefig(path, dpi=150, metadata=picture_metadata(path))
         return figure
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.format import number
+from palpate.output_files import picture_metadata
 from palpate.physics.materials.law_forms import stress_in_test
 from palpate.physics.materials.material_stability import Stability
 from palpate.physics.materials.specimen_tests import IndentationTest, SpecimenTest, StretchTest
@@ -222,7 +223,7 @@ class MaterialFit:
         for axes in (above, below):
             axes.grid(alpha=0.3)
         if path is not None:
-            figure.savefig(path, dpi=150)
+            figure.savefig(path, dpi=150, metadata=picture_metadata(path))
         return figure
 
     def _curve(self, i: int, test: SpecimenTest) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -18,9 +18,11 @@ import numpy as np
 from palpate.errors import FileFormatError, UsageError
 from palpate.physics.shapes.mesh_groups import SOLIDS, Group, MeshSource
 from palpate.physics.shapes.naming import plain_name
+from palpate.physics.shapes.packed_file import read_part
 
 __all__ = ["read_abaqus"]
 
+MOST_NUMBERS = 5_000_000  # that a line may generate
 DEEPEST = 10  # files that include each other
 # keywords that make nodes or elements out of others
 MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SUBMODEL")
@@ -88,11 +90,13 @@ def _refuse(path: str, line: int, what: str, why: str, fix: str) -> UsageError:
 def _blocks(path: str, name: Path, depth: int = 0) -> Iterator[_Block]:
     """Yield the keywords of a file and of those that it includes."""
     try:
-        lines = name.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
+        lines = read_part(name).decode("utf-8", "replace").splitlines()
+    except UsageError as error:
+        if not depth:
+            raise
         raise UsageError(
             f"{path} includes {name}, which can't be read.",
-            why=f"{error.strerror}.",
+            why=error.why,
             fix="Put the file beside it, or export the whole mesh into one file.",
         ) from error
     if depth > DEEPEST:
@@ -310,6 +314,10 @@ def _read_set(block: _Block, scope: _Part) -> None:
         cells = [cell for cell in row if cell]
         if "GENERATE" in block.options:
             first, last, step = (int(v) for v in [*cells, "1"][:3])
+            if len(range(first, last + 1, step)) > MOST_NUMBERS:
+                raise ValueError(
+                    f"line {block.line} generates the numbers {first} to {last}, more than a mesh has"
+                )
             members += range(first, last + 1, step)
         else:
             for cell in cells:

@@ -13,7 +13,7 @@ import hashlib
 import io
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,9 +22,11 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
-from palpate.file_kinds import way_for
+from palpate.file_kinds import PART_FORMATS, part_ending, way_for
+from palpate.files import TemporaryFolder
 from palpate.physics.advice import advise
 from palpate.physics.shapes.naming import require_known, require_name
+from palpate.physics.shapes.packed_file import plain_file, read_part, require_counts, require_file
 from palpate.physics.shapes.triangle_list import read_triangles
 from palpate.processes import is_supervised
 
@@ -43,6 +45,7 @@ __all__ = [
     "require_unit",
     "segments",
     "tell_repairs",
+    "tetgen_file",
 ]
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
@@ -53,6 +56,7 @@ _NAMED = {
     ".xdmf": re.compile(rb">\s*([^<>:\s][^<>:\r\n]*\.(?:h5|hdf5?|hdf)):", re.I),
     ".inp": re.compile(rb"^\*\s*include\s*,\s*input\s*=\s*([^\r\n,]+)", re.I | re.M),
 }
+TETGEN = (".node", ".ele", ".face")  # ends of the files of one mesh
 Point = tuple[float, float, float]
 Corner = tuple[float | None, float | None, float | None]
 
@@ -70,13 +74,38 @@ def require_unit(unit: Any) -> None:
 def named_files(path: str) -> tuple[Path, ...]:
     """Files that are read together with a file: TetGen's others, those of an XDMF file's numbers, included ones."""
     file = Path(path)
-    ending = file.suffix.lower()
-    if ending in {".node", ".ele"}:
-        return tuple(file.with_suffix(other) for other in (".node", ".ele", ".face") if other != ending)
+    ending = part_ending(path)
+    if ending in TETGEN:
+        return tuple(tetgen_file(path, other) for other in TETGEN if other != ending)
     if ending not in _NAMED:
         return ()
     names = dict.fromkeys(_NAMED[ending].findall(file.read_bytes()))
     return tuple(file.parent / name.decode("utf-8", "replace").strip(' "') for name in names)
+
+
+def tetgen_file(path: str, ending: str) -> Path:
+    """Return the file of TetGen's that has this ending, in any case, beside another one of the same mesh."""
+    file = Path(path)
+    if not file.parent.is_dir():
+        return file.with_suffix(ending)
+    beside = (other for other in file.parent.iterdir() if other.suffix.lower() == ending)
+    return next((other for other in beside if other.stem == file.stem), file.with_suffix(ending))
+
+
+@contextlib.contextmanager
+def _for_meshio(path: str, content: bytes | None) -> Iterator[str]:
+    """Yield the path of a file as meshio takes it; it knows endings in any case, but of TetGen's files."""
+    if part_ending(path) in TETGEN and Path(path).suffix not in TETGEN:
+        with TemporaryFolder() as folder:
+            for ending in TETGEN:
+                if (file := tetgen_file(path, ending)).is_file():
+                    (folder / f"part{ending}").write_bytes(file.read_bytes())
+            yield str(folder / f"part{part_ending(path)}")
+    elif content is None and Path(path).suffix.lower() != ".gz":
+        yield path
+    else:
+        with plain_file(path, content=content) as plain:
+            yield plain
 
 
 def digest_of(path: str) -> str:
@@ -85,18 +114,12 @@ def digest_of(path: str) -> str:
     Raises
     ------
     UsageError
-        If there is no such file.
+        If there is no such file, or it is a folder or a device.
     FileFormatError
         If it is empty.
     """
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise UsageError(
-            f"The file {path} can't be read.",
-            why=f"{error.strerror}.",
-            fix="Check the path; a relative one starts from the directory of the running program.",
-        ) from error
+    require_file(path)
+    content = Path(path).read_bytes()
     if not content.strip():
         raise FileFormatError(
             f"The file {path} is empty.", why="It has no content.", fix="Export the shape again."
@@ -129,8 +152,8 @@ def tell_repairs(path: str, notes: Sequence[str]) -> None:
     )
 
 
-def read_with_meshio(path: str) -> Any:
-    """Read a file of a mesh.
+def read_with_meshio(path: str, content: bytes | None = None) -> Any:
+    """Read a file of a mesh, or this content in place of its own.
 
     Returns
     -------
@@ -147,13 +170,13 @@ def read_with_meshio(path: str) -> Any:
 
     import meshio
 
-    if Path(path).suffix.lower() not in meshio.extension_to_filetypes:
+    if part_ending(path) not in meshio.extension_to_filetypes:
         raise FileFormatError(
             f"{path} is in none of the formats of parts and meshes.",
             why=f"Its name ends in {Path(path).suffix or 'nothing'}.",
-            fix="Give STL or STEP (a surface or solids), or a mesh: VTU, VTK, MSH, INP, NAS, MED or XDMF. "
-            + way_for(path),
+            fix=f"Give {PART_FORMATS}. {way_for(path)}".strip(),
         )
+    require_counts(path, read_part(path))
     try:
         # Where no reader takes the file, meshio prints and ends the program. Its reader of STL takes four letters
         # of an ASCII file for a count, which may overflow: no harm.
@@ -162,8 +185,9 @@ def read_with_meshio(path: str) -> Any:
             contextlib.redirect_stdout(silent),
             contextlib.redirect_stderr(silent),
             np.errstate(over="ignore"),
+            _for_meshio(path, content) as plain,
         ):
-            mesh = meshio.read(path)
+            mesh = meshio.read(plain)
         mesh.said = silent.getvalue()
     except ImportError as error:
         package = error.name or "h5py"
@@ -184,6 +208,8 @@ def read_with_meshio(path: str) -> Any:
         OSError,
         EOFError,
         RuntimeError,
+        MemoryError,
+        OverflowError,
     ) as error:
         raise _unreadable(path, error) from error
     return mesh

@@ -1,19 +1,20 @@
-"""Meshes of Gmsh in format 4.1, with all groups of each entity.
+"""Meshes of Gmsh in formats 4.0 and 4.1, with all groups of each entity.
 
-Layout after the Gmsh reference manual, "MSH file format version 4.1" (Geuzaine & Remacle, https://gmsh.info).
+Layout after the Gmsh reference manual, "MSH file format version 4.1" and "version 4.0" (Geuzaine & Remacle,
+https://gmsh.info). Format 4.0 has the number of a node or element before its data, and other heads of blocks.
 """
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict
-from pathlib import Path
 
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.physics.shapes.mesh_groups import FACES, SOLIDS, Group, MeshSource
 from palpate.physics.shapes.naming import plain_name
+from palpate.physics.shapes.packed_file import read_part
 
 __all__ = ["is_gmsh_4", "read_gmsh"]
 
@@ -37,9 +38,8 @@ NAMES = re.compile(rb'^\s*(\d+)\s+(-?\d+)\s+"(.*)"', re.MULTILINE)
 
 
 def is_gmsh_4(path: str) -> bool:
-    """Tell whether a file is one of Gmsh in format 4.1."""
-    with Path(path).open("rb") as file:
-        return re.match(rb"\s*\$MeshFormat\s+4\.1\b", file.read(200)) is not None
+    """Tell whether a file is one of Gmsh in format 4.0 or 4.1."""
+    return re.match(rb"\s*\$MeshFormat\s+4(\.[01])?\s", read_part(path)[:200]) is not None
 
 
 class _Numbers:
@@ -74,13 +74,19 @@ class _Numbers:
         """Return floating-point numbers."""
         return self._take("f8", count)
 
+    def require(self, count: int) -> int:
+        """Return a count that the section states; refuse one that it has no room for."""
+        if not 0 <= count <= len(self.section):
+            raise ValueError(f"it states {count:,} where there is room for {len(self.section):,} bytes")
+        return count
+
     def size(self) -> int:
         """Return one whole number of eight bytes."""
         return int(self.sizes(1)[0])
 
 
 def read_gmsh(path: str) -> MeshSource:
-    """Read a mesh of Gmsh in format 4.1, as text or binary.
+    """Read a mesh of Gmsh in format 4.1, as text or binary, or in format 4.0 as text.
 
     An entity may belong to several physical groups, or to none. Where there is no physical group of a dimension,
     the geometry's own entities are groups by their numbers.
@@ -92,7 +98,7 @@ def read_gmsh(path: str) -> MeshSource:
     UsageError
         If it is one part of a partitioned mesh.
     """
-    content = Path(path).read_bytes()
+    content = read_part(path)
     if b"$PartitionedEntities" in content:
         raise UsageError(
             f"The mesh in {path} is partitioned.",
@@ -119,8 +125,10 @@ def _section(content: bytes, name: str) -> bytes:
 
 def _read(path: str, content: bytes) -> MeshSource:
     form = _section(content, "MeshFormat")
-    _, binary, size = form.split()[:3]
-    order = None
+    version, binary, size = form.split()[:3]
+    order, old = None, version != b"4.1"
+    if old and binary == b"1":
+        raise ValueError("binary files of format 4.0 are not read; save it in format 4.1")
     if binary == b"1":
         one = form[form.index(b"\n") + 1 :][:4]
         order = "<" if one == b"\x01\0\0\0" else ">"
@@ -128,72 +136,94 @@ def _read(path: str, content: bytes) -> MeshSource:
             raise ValueError(f"sizes of {size.decode()} bytes")
     groups: dict[tuple[int, int], list[int]] = {}
     if b"$Entities" in content:
-        groups = _read_entities(_Numbers(_section(content, "Entities"), order))
-    points, row_of = _read_nodes(_Numbers(_section(content, "Nodes"), order))
+        groups = _read_entities(_Numbers(_section(content, "Entities"), order), old=old)
+    points, row_of = _read_nodes(_Numbers(_section(content, "Nodes"), order), old=old)
     names = {}
     if b"$PhysicalNames" in content:
         for dimension, number, name in NAMES.findall(_section(content, "PhysicalNames")):
             names[int(dimension), int(number)] = plain_name(name.decode("utf-8", "replace"))
     source = MeshSource(path, points)
-    _read_elements(source, _Numbers(_section(content, "Elements"), order), row_of, groups, names)
+    elements = _Numbers(_section(content, "Elements"), order)
+    _read_elements(source, elements, row_of, groups, names, old=old)
     return source
 
 
-def _read_entities(numbers: _Numbers) -> dict[tuple[int, int], list[int]]:
+def _read_entities(numbers: _Numbers, *, old: bool) -> dict[tuple[int, int], list[int]]:
     """Physical groups of each entity (dimension, number)."""
     groups = {}
     for dimension, count in enumerate(numbers.sizes(4).tolist()):
-        for _ in range(count):
+        for _ in range(numbers.require(count)):
             tag = int(numbers.integers(1)[0])
-            numbers.reals(3 if dimension == 0 else 6)  # its place
+            numbers.reals(3 if dimension == 0 and not old else 6)  # its place
             groups[dimension, tag] = np.abs(numbers.integers(numbers.size())).tolist()
             if dimension:
                 numbers.integers(numbers.size())  # what bounds it
     return groups
 
 
-def _read_nodes(numbers: _Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Places (n, 3), and the row of each number of a node."""
-    blocks, count, _, _ = numbers.sizes(4).tolist()
-    points, tags = np.empty((count, 3)), np.empty(count, dtype=np.int64)
+def _read_nodes(numbers: _Numbers, *, old: bool) -> tuple[np.ndarray, _Rows]:
+    """Places (n, 3), and the rows of the nodes' numbers."""
+    blocks, count = numbers.sizes(2).tolist()
+    numbers.sizes(0 if old else 2)
+    numbers.require(blocks)
+    points, tags = np.empty((numbers.require(count), 3)), np.empty(count, dtype=np.int64)
     start = 0
     for _ in range(blocks):
-        dimension, _, parametric = numbers.integers(3).tolist()
-        size = numbers.size()
+        first, second, parametric = numbers.integers(3).tolist()
+        dimension = second if old else first
+        size = numbers.require(numbers.size())
         rows = slice(start, start + size)
-        tags[rows] = numbers.sizes(size)
         # places on a curve or face follow the coordinates
         width = 3 + (min(dimension, 2) if parametric else 0) + (1 if parametric and dimension == 3 else 0)
-        points[rows] = numbers.reals(width * size).reshape(size, width)[:, :3]
+        if old:
+            table = numbers.reals((1 + width) * size).reshape(size, 1 + width)
+            tags[rows], points[rows] = table[:, 0].astype(np.int64), table[:, 1:4]
+        else:
+            tags[rows] = numbers.sizes(size)
+            points[rows] = numbers.reals(width * size).reshape(size, width)[:, :3]
         start += size
     if start != count:
         raise ValueError(f"{count - start} of {count} nodes are missing")
-    row_of = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)
-    row_of[tags] = np.arange(count)
-    return points, row_of
+    return points, _Rows(tags)
+
+
+class _Rows:
+    """The rows of nodes by their numbers, which may have gaps of any size."""
+
+    def __init__(self, tags: np.ndarray) -> None:
+        self.order = np.argsort(tags, kind="stable")
+        self.tags = tags[self.order]
+
+    def of(self, tags: np.ndarray) -> np.ndarray:
+        """Return the rows of numbers of any shape; refuse those that no node has."""
+        at = np.minimum(np.searchsorted(self.tags, tags), max(len(self.tags) - 1, 0))
+        if not len(self.tags) or (self.tags[at] != tags).any():
+            raise ValueError("an element has a node that is not there")
+        return np.asarray(self.order[at])
 
 
 def _read_elements(
     source: MeshSource,
     numbers: _Numbers,
-    row_of: np.ndarray,
+    row_of: _Rows,
     groups: dict[tuple[int, int], list[int]],
     names: dict[tuple[int, int], str],
+    *,
+    old: bool,
 ) -> None:
     """Add the cells, and for each group its members."""
-    blocks = numbers.sizes(4)[0]
+    blocks = numbers.require(int(numbers.sizes(2 if old else 4)[0]))
     physical: dict[tuple[int, int], list[np.ndarray]] = defaultdict(list)
     elementary: dict[tuple[int, int], list[np.ndarray]] = defaultdict(list)
     solids = 0
-    for _ in range(int(blocks)):
-        dimension, entity, element = numbers.integers(3).tolist()
-        count = numbers.size()
+    for _ in range(blocks):
+        first, second, element = numbers.integers(3).tolist()
+        dimension, entity = (second, first) if old else (first, second)
+        count = numbers.require(numbers.size())
         if element not in ELEMENTS:
             raise ValueError(f"{count} elements are of Gmsh's type {element}, which is not read")
         kind, nodes = ELEMENTS[element]
-        cells = row_of[numbers.sizes(count * (nodes + 1)).reshape(count, nodes + 1)[:, 1:]]
-        if (cells < 0).any():
-            raise ValueError("an element has a node that is not there")
+        cells = row_of.of(numbers.sizes(count * (nodes + 1)).reshape(count, nodes + 1)[:, 1:])
         if kind in SOLIDS:
             source.add_solids(kind, cells[:, : SOLIDS[kind]])
             members = np.arange(solids, solids + count)

@@ -139,12 +139,7 @@ def _read(shape: ImportedMesh) -> tuple[BodyMesh, tuple[str, ...]]:
             fix="Export the mesh with cells of these kinds only.",
         )
     if not source.solids:
-        kinds = ", ".join(sorted(source.others)) or "nothing"
-        raise UsageError(
-            f"{shape.path} has no cells of volume.",
-            why=f"It holds {kinds}; tetrahedra, hexahedra, wedges or pyramids are needed.",
-            fix="Export the volume mesh, or for a closed surface use ImportedSolid with an STL file.",
-        )
+        raise _without_volume(source)
     mesh, node_of = _volume(source, shape)
     mesh = _with_surfaces(mesh, source, node_of, shape)
     tell_repairs(shape.path, source.notes)
@@ -153,6 +148,23 @@ def _read(shape: ImportedMesh) -> tuple[BodyMesh, tuple[str, ...]]:
         counts[PLURAL.get(kind, "")] += len(cells)
     split = " and ".join(f"{count} {kind}" for kind, count in counts.items() if kind)
     return mesh, (*source.notes, f"{split} were split into tetrahedra.") if split else tuple(source.notes)
+
+
+def _without_volume(source: MeshSource) -> UsageError:
+    """Return the error of a mesh that has no cells of volume, with its cause where the file shows it."""
+    kinds = ", ".join(f"{count} of the kind {kind}" for kind, count in source.others.items()) or "none"
+    why = f"Its cells are {kinds}; tetrahedra, hexahedra, wedges or pyramids are needed."
+    fix = (
+        "Export the volume mesh, or the closed surface as STL, OBJ or PLY (for ImportedSolid): it is filled."
+    )
+    named = ", ".join(dict.fromkeys(repr(group.name) for group in source.faces))
+    if named and not source.regions:
+        why += f" It has groups of surfaces alone ({named}), and some programs leave out what is in no group."
+        fix = (
+            "Add a group of the volume (in Gmsh a Physical Volume, or Mesh.SaveAll = 1) and save it again. "
+            + fix
+        )
+    return UsageError(f"{source.path} has no cells of volume.", why=why, fix=fix)
 
 
 def _volume(source: MeshSource, shape: ImportedMesh) -> tuple[BodyMesh, np.ndarray]:

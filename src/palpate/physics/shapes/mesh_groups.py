@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-__all__ = ["FACES", "SOLIDS", "Group", "MeshSource"]
+from palpate.errors import FileFormatError
+
+__all__ = ["FACES", "SOLIDS", "Group", "MeshSource", "require_sound"]
 
 SOLIDS = {"tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
 """Kinds of cells of volume, and their numbers of corners."""
@@ -84,3 +86,36 @@ class MeshSource:
     def unread(self) -> dict[str, int]:
         """Numbers of cells that may have a volume and are of no kind that is read."""
         return {kind: count for kind, count in self.others.items() if not kind.startswith(THIN)}
+
+
+def require_sound(source: MeshSource) -> None:
+    """Refuse numbers of nodes and cells that are not there, and nodes at no place, in whatever format they stood.
+
+    Raises
+    ------
+    FileFormatError
+        With the first number that can't be.
+    """
+    nodes, cells = len(source.points), sum(len(block) for _, block in source.solids)
+    parts = [("A cell", block, nodes) for _, block in source.solids]
+    parts += [(f"The surface {group.name!r}", group.members, nodes) for group in source.faces]
+    parts += [(f"The set of nodes {group.name!r}", group.members, nodes) for group in source.node_sets]
+    parts += [(f"The region {group.name!r}", group.members, cells) for group in source.regions]
+    for what, members, there in parts:
+        wrong = members[(members < 0) | (members >= there)]
+        if wrong.size:
+            raise FileFormatError(
+                f"{what} of {source.path} names number {int(wrong.flat[0])}, counted from 0, of {there}.",
+                why="The file is damaged or cut short.",
+                fix="Open it in the program that made it and export it again.",
+            )
+    used = np.unique(
+        np.concatenate([np.empty(0, dtype=np.int64), *(block.ravel() for _, block in source.solids)])
+    )
+    bad = used[~np.isfinite(source.points[used]).all(axis=1)]
+    if len(bad):
+        raise FileFormatError(
+            f"{len(bad)} nodes of {source.path} have coordinates that are no finite numbers.",
+            why=f"The first is node {int(bad[0])}, counted from 0.",
+            fix="Open it in the program that made it and export it again.",
+        )

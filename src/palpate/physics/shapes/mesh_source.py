@@ -10,22 +10,30 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
-from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.file_kinds import part_ending
+from palpate.physics.apart import read_apart
 from palpate.physics.shapes.abaqus_file import read_abaqus
-from palpate.physics.shapes.body_file import named_files, read_with_meshio
+from palpate.physics.shapes.body_file import named_files, read_with_meshio, tetgen_file
 from palpate.physics.shapes.gmsh_file import is_gmsh_4, read_gmsh
-from palpate.physics.shapes.mesh_groups import FACES, SOLIDS, Group, MeshSource
+from palpate.physics.shapes.mesh_groups import FACES, SOLIDS, Group, MeshSource, require_sound
 from palpate.physics.shapes.naming import plain_name
+from palpate.physics.shapes.packed_file import read_part, require_counts
+from palpate.physics.shapes.vtk_file import read_grid
 
 __all__ = ["read_source"]
 
 VTK = (".vtu", ".vtk")
+NASTRAN = (".bdf", ".nas", ".fem")
+# formats whose numbers a library in C reads, which runs in a process of its own
+LIBRARIES = {
+    **dict.fromkeys((".xdmf", ".xmf", ".med", ".h5m"), "h5py"),
+    **dict.fromkeys((".exo", ".e"), "netCDF4"),
+}
 # cell data that writers use for materials and groups, before any other
 TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "region", "Region", "material", "MaterialId")
 # cell data that numbers the cells, or how the mesh was shared out
@@ -34,31 +42,6 @@ TECHNICAL = re.compile(
     re.I,
 )
 MOST_LABELS = 200  # numbers that differ more often are no labels
-# VTK's numbers of cells, and meshio's words for them
-VTK_CELLS = {
-    **{5: "triangle", 22: "triangle6", 9: "quad", 23: "quad8", 28: "quad9", 10: "tetra", 24: "tetra10"},
-    **{12: "hexahedron", 25: "hexahedron20", 29: "hexahedron27", 13: "wedge", 26: "wedge15", 14: "pyramid"},
-    **{
-        27: "pyramid13",
-        69: "triangle",
-        70: "quad",
-        71: "tetra",
-        72: "hexahedron",
-        73: "wedge",
-        74: "pyramid",
-    },
-    **{
-        1: "vertex",
-        2: "vertex",
-        3: "line",
-        4: "line",
-        21: "line",
-        68: "line",
-        42: "polyhedron",
-        7: "polygon",
-    },
-}
-VOXEL, PIXEL = 11, 8  # VTK's boxes, whose corners run along x first
 SOLID_CARD = re.compile(rb"^(CTETRA|CHEXA|CPENTA|CPYRAM?)\*?[ ,\t]", re.MULTILINE | re.IGNORECASE)
 VTK_COUNT = re.compile(rb'\bNumberOfCells="(\d+)"|^CELL_TYPES (\d+)', re.MULTILINE)
 PROPERTY = re.compile(
@@ -85,13 +68,19 @@ def read_source(path: str, labels: str | None = None) -> MeshSource:
     UsageError
         If reading it needs a package that is not installed.
     """
-    ending = Path(path).suffix.lower()
+    source = _read(path, labels)
+    require_sound(source)
+    return source
+
+
+def _read(path: str, labels: str | None) -> MeshSource:
+    ending = part_ending(path)
     if ending == ".inp":
         return read_abaqus(path)
     if ending == ".msh" and is_gmsh_4(path):
         return read_gmsh(path)
     mesh = _read_vtk(path) if ending in VTK else _read_other(path)
-    if ending in {".bdf", ".nas", ".fem"}:
+    if ending in NASTRAN:
         _require_all_cards(path, mesh)
         _require_basic_system(path, mesh)
         _name_properties(path, mesh)
@@ -104,7 +93,13 @@ def read_source(path: str, labels: str | None = None) -> MeshSource:
 
 def _read_other(path: str) -> Any:
     """Read a file by meshio; say which file is missing where its numbers stand in another one."""
+    ending = part_ending(path)
     try:
+        if ending in NASTRAN and not (content := read_part(path)).count(b"BEGIN BULK"):
+            # Gmsh writes the bulk data alone
+            return read_with_meshio(path, b"BEGIN BULK\n" + content)
+        if ending in LIBRARIES and _is_installed(LIBRARIES[ending]):
+            return read_apart(read_with_meshio, path, doing=f"reading {path}")
         return read_with_meshio(path)
     except FileFormatError as error:
         missing = [other for other in named_files(path) if not other.is_file()]
@@ -117,78 +112,25 @@ def _read_other(path: str) -> Any:
         ) from error
 
 
+def _is_installed(package: str) -> bool:
+    try:
+        return find_spec(package) is not None
+    except ValueError:  # it is there, and not to be used
+        return False
+
+
 def _read_vtk(path: str) -> Any:
     """Read a VTK file by meshio; by PyVista where meshio doesn't know its form, or passes over kinds of cells."""
-    content = Path(path).read_bytes()
+    content = read_part(path)
+    require_counts(path, content)
     try:
         mesh = read_with_meshio(path)
     except FileFormatError:
-        if path.lower().endswith(".vtu") and b"</VTKFile>" not in content[-200:]:
+        if part_ending(path) == ".vtu" and b"</VTKFile>" not in content[-200:]:
             raise  # cut short
-        return _read_with_pyvista(path)
+        return read_grid(path)
     stated = sum(int(a or b) for a, b in VTK_COUNT.findall(content))
-    return mesh if stated == sum(len(block.data) for block in mesh.cells) else _read_with_pyvista(path)
-
-
-def _read_with_pyvista(path: str) -> Any:
-    """Read a VTK file in a form that meshio doesn't know, in the layout of a `meshio.Mesh`."""
-    if find_spec("pyvista") is None:
-        raise UsageError(
-            f"The file {path} can't be read without the package pyvista.",
-            why="It is damaged, or of a form that only VTK reads: LZ4, legacy 5.1, texts among the numbers, boxes.",
-            fix="pip install 'palpate[results]', or export it with zlib compression or as legacy VTK 4.2.",
-        )
-    import pyvista
-
-    faults: list[str] = []
-    try:
-        reader = pyvista.get_reader(path)
-        # VTK prints what it finds wrong, and goes on with what it has
-        reader.reader.AddObserver("ErrorEvent", lambda *_: faults.append("VTK reports an error"))
-        grid = reader.read().cast_to_unstructured_grid()
-    except (OSError, ValueError, TypeError, RuntimeError, AttributeError) as error:
-        raise _damaged_vtk(path, str(error)) from error
-    if faults or not grid.n_cells:
-        raise _damaged_vtk(path, faults[0] if faults else "it has no cells")
-    kinds = np.asarray(grid.celltypes)
-    # PyVista 0.49 renamed it
-    offset = np.asarray(grid.cell_offsets if hasattr(grid, "cell_offsets") else grid.offset)
-    connectivity = np.asarray(grid.cell_connectivity)
-    cells, rows = [], []
-    for kind in np.unique(kinds).tolist():
-        chosen = np.flatnonzero(kinds == kind)
-        size = int(offset[chosen[0] + 1] - offset[chosen[0]])
-        if (np.diff(offset)[chosen] != size).any():
-            word, nodes = (
-                VTK_CELLS.get(kind, f"cell of VTK type {kind}"),
-                np.empty((len(chosen), 0), dtype=int),
-            )
-        else:
-            nodes = connectivity[offset[chosen][:, None] + np.arange(size)]
-            word = VTK_CELLS.get(kind, f"cell of VTK type {kind}")
-        if kind == VOXEL:
-            word, nodes = "hexahedron", nodes[:, [0, 1, 3, 2, 4, 5, 7, 6]]
-        if kind == PIXEL:
-            word, nodes = "quad", nodes[:, [0, 1, 3, 2]]
-        cells.append(SimpleNamespace(type=word, data=nodes))
-        rows.append(chosen)
-    data = {name: [np.asarray(grid.cell_data[name])[chosen] for chosen in rows] for name in grid.cell_data}
-    return SimpleNamespace(
-        points=np.asarray(grid.points),
-        cells=cells,
-        cell_data=data,
-        field_data={},
-        cell_sets={},
-        point_sets={},
-    )
-
-
-def _damaged_vtk(path: str, said: str) -> FileFormatError:
-    return FileFormatError(
-        f"The file {path} can't be read as a mesh.",
-        why=f"It is damaged or cut short ({said.strip()}).",
-        fix="Open it in the program that made it and export it again, as VTU for example.",
-    )
+    return mesh if stated == sum(len(block.data) for block in mesh.cells) else read_grid(path)
 
 
 def _kind(word: str) -> str:
@@ -234,9 +176,7 @@ def _collect_numbers(
         key = labels or _label_key(source, mesh.cell_data, rows, dimension)
         if key is None or not rows:
             continue
-        numbers = np.concatenate([np.asarray(mesh.cell_data[key][row]).ravel() for row in rows]).astype(
-            np.int64
-        )
+        numbers = _numbers(source.path, key, [np.asarray(mesh.cell_data[key][row]) for row in rows])
         names = _names_of_numbers(mesh, key, dimension)
         for number in np.unique(numbers).tolist():
             if number == 0 and 0 not in names and dimension == 2:
@@ -247,6 +187,27 @@ def _collect_numbers(
                 source.regions.append(Group(name, np.flatnonzero(chosen), numbered=number not in names))
             else:
                 source.faces.append(_face_group(name, mesh, rows, chosen, numbered=number not in names))
+
+
+def _numbers(path: str, key: str, blocks: list[np.ndarray]) -> np.ndarray:
+    """Return the whole number of each cell; refuse data of which cells have several, or broken ones."""
+    flat = [block.reshape(len(block), -1) for block in blocks]
+    values = np.concatenate([block[:, :1] for block in flat]).ravel()
+    if any(block.shape[1] != 1 for block in flat):
+        what = f"{flat[0].shape[1]} numbers for each cell: a vector or a tensor"
+    elif not np.issubdtype(values.dtype, np.number) or not _are_whole(values):
+        what = "numbers that are not whole"
+    else:
+        return np.asarray(values, dtype=np.int64)
+    raise UsageError(
+        f"The cell data {key!r} of {path} can't tell regions apart.",
+        why=f"They are {what}.",
+        fix="Pass as labels the name of cell data with one whole number for each cell, or leave labels out.",
+    )
+
+
+def _are_whole(values: np.ndarray) -> bool:
+    return bool((np.isfinite(values) & (values == np.round(values))).all())
 
 
 def _face_group(
@@ -304,10 +265,7 @@ def _label_key(
 def _are_labels(value: np.ndarray) -> bool:
     if value.shape[1] != 1 or not np.issubdtype(value.dtype, np.number):
         return False
-    if (
-        not np.issubdtype(value.dtype, np.integer)
-        and not (np.isfinite(value) & (value == np.round(value))).all()
-    ):
+    if not np.issubdtype(value.dtype, np.integer) and not _are_whole(value):
         return False
     return len(np.unique(value)) <= MOST_LABELS
 
@@ -345,7 +303,7 @@ def _skip_messages(mesh: Any) -> list[str]:
 
 def _require_all_cards(path: str, mesh: Any) -> None:
     """Refuse a Nastran file of which meshio has passed over cells, as it does with those of sixteen columns."""
-    cards = Counter(word.decode().upper() for word in SOLID_CARD.findall(Path(path).read_bytes()))
+    cards = Counter(word.decode().upper() for word in SOLID_CARD.findall(read_part(path)))
     there = sum(cards.values())
     read = sum(len(block.data) for block in mesh.cells if _kind(block.type) in SOLIDS)
     if read != there:
@@ -370,7 +328,7 @@ def _require_basic_system(path: str, mesh: Any) -> None:
 
 def _name_properties(path: str, mesh: Any) -> None:
     """Add the names that preprocessors write into comments of a Nastran file to the numbers of properties."""
-    for match in PROPERTY.finditer(Path(path).read_bytes()):
+    for match in PROPERTY.finditer(read_part(path)):
         number, name = (match[1], match[2]) if match[1] else (match[3], match[4])
         text = name.decode("utf-8", "replace")
         # a field holds one name; the same number may be a solid's or a shell's
@@ -380,14 +338,14 @@ def _name_properties(path: str, mesh: Any) -> None:
 
 def _tetgen_faces(path: str, mesh: Any) -> list[Group]:
     """Boundary markers from the .face file that TetGen writes beside a mesh."""
-    beside = Path(path).with_suffix(".face")
+    beside = tetgen_file(path, ".face")
     if not beside.exists():
         return []
     lines = [line.split("#")[0].split() for line in beside.read_text(encoding="utf-8").splitlines()]
     rows = [line for line in lines if line]
     if not rows or len(rows[0]) < 2 or int(rows[0][1]) == 0:
         return []
-    nodes = Path(path).with_suffix(".node").read_text(encoding="utf-8").splitlines()
+    nodes = tetgen_file(path, ".node").read_text(encoding="utf-8").splitlines()
     first = [line.split("#")[0].split() for line in nodes if line.split("#")[0].strip()][1]
     table = np.array([row[:5] for row in rows[1 : int(rows[0][0]) + 1]], dtype=np.int64)
     triangles, marks = table[:, 1:4] - int(first[0]), table[:, 4]

@@ -211,6 +211,7 @@ def mesh_solid(
     coarse: float,
     refinements: tuple[FineMesh, ...],
     rename: Callable[[Any], None] | None = None,
+    least: float = 0.0,
 ) -> Any:
     """Mesh a solid whose faces and solids carry names.
 
@@ -227,6 +228,8 @@ def mesh_solid(
         Parts of surfaces that shall have smaller elements.
     rename : function, optional
         Of the mesh: gives its faces names, where those of the solid are not the ones that refinements speak of.
+    least : float
+        Size in m below which curvature makes no elements; refinements still do.
 
     Returns
     -------
@@ -246,7 +249,7 @@ def mesh_solid(
     points = []
     for refinement in refinements:
         if refinement not in flat:
-            rough = _generate(OCCGeometry(solid), solid, coarse)
+            rough = _generate(OCCGeometry(solid), solid, coarse, minh=least)
             if rename is not None:
                 rename(rough)
             places, area = points_on(body_mesh(rough), refinement)
@@ -257,7 +260,7 @@ def mesh_solid(
     for places, element in points:
         for place in places.tolist():
             geometry.RestrictH(Pnt(*place), element)
-    mesh = _generate(geometry, solid, coarse)
+    mesh = _generate(geometry, solid, coarse, minh=min([least, *(r.element for r in refinements)]))
     if rename is not None:
         rename(mesh)
     return mesh

@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.files import write_file
+from palpate.output_files import SAMPLE_HEAD
 
 __all__ = ["kidney_surface", "write_sample_part"]
 
@@ -79,5 +80,5 @@ def write_sample_part(path: str | os.PathLike[str]) -> Path:
     surface = Trimesh(np.round(1e3 * points, 4), triangles, process=False)
     content = surface.export(file_type="stl")
     assert isinstance(content, bytes)
-    write_file(path, content)
+    write_file(path, SAMPLE_HEAD.ljust(80) + content[80:])
     return path

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from palpate.errors import UsageError
 from palpate.files import write_file
+from palpate.output_files import free_path, with_seal
 
 if TYPE_CHECKING:
     from palpate.learning.growth_frames import GrowthRecorder
@@ -48,4 +49,5 @@ def growth_html(growth: GrowthRecorder, name: str) -> str:
 
 def write_growth_page(path: str | os.PathLike[str], growth: GrowthRecorder, name: str) -> Path:
     """Write the page and return its path; the parameters are those of `growth_html`."""
-    return write_file(path, growth_html(growth, name))
+    file = free_path(path)
+    return write_file(file, with_seal(file, growth_html(growth, name)))

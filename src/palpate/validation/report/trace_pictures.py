@@ -11,6 +11,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.files import writing
 from palpate.format import plain, share
+from palpate.output_files import picture_metadata
 from palpate.runtime.trace_file import Trace
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.style import BLUE, INK, ORANGE, Picture, figure, picture, styled
@@ -147,7 +148,13 @@ def save_figure(path: str | os.PathLike[str], draw: Callable[[], Figure]) -> Pat
     target = Path(path)
     with styled(target.stem), writing(target) as part:
         try:
-            draw().savefig(part, dpi=160, facecolor="white", format=target.suffix[1:] or "svg")
+            draw().savefig(
+                part,
+                dpi=160,
+                facecolor="white",
+                format=target.suffix[1:] or "svg",
+                metadata=picture_metadata(target),
+            )
         except ValueError as error:
             raise UsageError(
                 f"{target.name} names no format of a picture.",

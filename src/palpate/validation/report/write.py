@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from palpate.errors import UsageError
 from palpate.files import system_errors, writing
 from palpate.format import bind_units
+from palpate.output_files import free_path, with_seal
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.hand_pictures import hand_pictures
 from palpate.validation.report.history_pictures import history_pictures
@@ -50,6 +51,8 @@ def write_report(
 ) -> Path:
     """Write one self-contained HTML file and return its path.
 
+    A report takes the place of an earlier one; where somebody else's file has the name, it gets a number.
+
     Parameters
     ----------
     path : path
@@ -68,12 +71,13 @@ def write_report(
     ResourceError
         If the disk is full, or the folder write-protected.
     """
-    target = Path(path)
+    target = free_path(path)
     with system_errors(f"Could not write {target}."):
         target.parent.mkdir(parents=True, exist_ok=True)
     with writing(target) as part:  # a reader never meets half a page
         part.touch()  # a path that can't be written is found before the figures are drawn
-        part.write_text(render(chapters, title=title, machine=machine), encoding="utf-8", newline="\n")
+        page = with_seal(target, render(chapters, title=title, machine=machine))
+        part.write_text(page, encoding="utf-8", newline="\n")
     return target
 
 

@@ -1,10 +1,9 @@
-"""Closed surfaces of STL files: read, repaired, searched for faults, split into named parts, filled with tetrahedra."""
+"""Closed surfaces of files: read, repaired, searched for faults, split into named parts, filled with tetrahedra."""
 
 from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,29 +23,30 @@ from palpate.physics.shapes.meshing import (
     split_triangles,
 )
 from palpate.physics.shapes.shape import require_size
-from palpate.physics.shapes.stl_text import parse_stl
 from palpate.physics.shapes.surface_checks import require_closed, shells_of, surface_gap
+from palpate.physics.shapes.surface_file import parse_surface
 from palpate.physics.shapes.surface_repair import Surface, is_manifold, open_edges, place, repair_surface
 from palpate.physics.shapes.surface_simplify import MANY, TOLERANCE, simplify_surface
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-__all__ = ["bodies_apart", "fill_surface", "name_parts", "read_stl"]
+__all__ = ["bodies_apart", "fill_surface", "name_parts", "read_surface"]
 
 LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
+FLAT = 1e-7  # thickness over length below which a surface lies in a plane
 SHARP = (
     0.05  # weight of a normal's direction against distance over the body's length, where faces are compared
 )
 
 
-def read_stl(path: str, unit: str, simplify: float | None = None) -> tuple[Trimesh, Surface]:
-    """Read the surface of an STL file, repaired, simplified if it is large, and searched for faults.
+def read_surface(path: str, unit: str, simplify: float | None = None) -> tuple[Trimesh, Surface]:
+    """Read the surface of a file, repaired, simplified if it is large, and searched for faults.
 
     Parameters
     ----------
     path : str
-        An ASCII or binary STL file.
+        A file that `parse_surface` reads.
     unit : str
         Unit of its coordinates, a key of `UNITS`.
     simplify : float, optional
@@ -58,22 +58,60 @@ def read_stl(path: str, unit: str, simplify: float | None = None) -> tuple[Trime
     topology : trimesh.Trimesh
         The surface with its edges, in m.
     surface : Surface
-        The same with the names of the file's solids, and a note about each repair.
+        The same with the names of the file's parts, and a note about each repair.
 
     Raises
     ------
     FileFormatError
-        If the file is no STL file.
+        If the file is of another format than its name says, or damaged.
     UsageError
         If the surface bounds no body, or its size tells of mistaken units.
     """
-    surface = parse_stl(path, Path(path).read_bytes())
+    surface = parse_surface(path)
     surface = replace(surface, points=surface.points * UNITS[unit])
     require_size(path, surface.length, unit)
-    surface = repair_surface(surface)
+    _require_thickness(path, surface)
+    surface = _turn_outwards(repair_surface(surface))
     topology, whole = _simplify(path, surface, simplify)
     tell_repairs(path, surface.notes)
     return topology, whole
+
+
+def _require_thickness(path: str, surface: Surface) -> None:
+    """Refuse a surface that lies in a plane."""
+    corners = surface.points[surface.triangles].reshape(-1, 3)
+    middle = corners.mean(axis=0)
+    # root of the least mean square distance from any plane through the middle
+    thickness = float(np.sqrt(max(0.0, np.linalg.eigvalsh(np.cov((corners - middle).T))[0])))
+    if thickness < FLAT * surface.length:
+        raise UsageError(
+            f"The surface of {path} has no thickness.",
+            why=f"All of its triangles lie in a plane around {place(middle)}, so that there is no volume between them.",
+            fix="Give the sheet a thickness in the program that made the file (solidify, thicken, extrude).",
+        )
+
+
+def _turn_outwards(surface: Surface) -> Surface:
+    """Return the surface with closed shells that are inside out turned, and a note that tells it.
+
+    Turned are all shells where all face the wrong way, else those that lie in no other one.
+    """
+    from trimesh import Trimesh
+
+    if not is_manifold(surface.triangles):
+        return surface
+    shells = shells_of(Trimesh(surface.points, surface.triangles, process=False))
+    depth = np.array([len(around) for around in shells.inside])
+    wrong = (shells.volumes < 0) == (depth % 2 == 0)
+    turned = wrong if wrong.all() else wrong & (depth == 0)
+    if not turned.any():
+        return surface
+    chosen = turned[shells.shell_of]
+    triangles = np.where(chosen[:, None], surface.triangles[:, ::-1], surface.triangles)
+    what = "It was" if turned.all() else f"{int(turned.sum())} of its {len(turned)} closed shells were"
+    return replace(surface, triangles=triangles).with_note(
+        f"{what} inside out: its triangles faced inwards, and were turned."
+    )
 
 
 def _simplify(path: str, surface: Surface, simplify: float | None) -> tuple[Trimesh, Surface]:

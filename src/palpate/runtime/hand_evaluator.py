@@ -26,8 +26,9 @@ from numba import njit
 
 from palpate.surrogates.memories import Carry
 from palpate.surrogates.moving_rest import MovingRest
+from palpate.units import Range
 
-__all__ = ["Elastic", "HandEvaluator", "stiffness_along"]
+__all__ = ["Elastic", "HandEvaluator", "Model", "stiffness_along"]
 
 # slope of d: 1 for a distance, measured 1.0004 at most where five bodies are pressed; behind flat ones it is 6 at s = 0
 _STEEP = 1.2
@@ -73,6 +74,19 @@ class Elastic(Protocol):
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
         """Renew the attributes at `position` (3,), m, and the further inputs (p,)."""
+        ...
+
+
+class Model(Protocol):
+    """A learnt body as the loop asks for it; `palpate.runtime.touchable.Touchable` is one."""
+
+    @property
+    def parameters(self) -> tuple[Range, ...]:
+        """The inputs that the hand doesn't supply."""
+        ...
+
+    def evaluator(self) -> HandEvaluator:
+        """Return the allocation-free evaluator."""
         ...
 
 

@@ -25,7 +25,6 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 
@@ -33,43 +32,27 @@ from palpate.errors import DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.blending import Blend
 from palpate.runtime.coupling import STEPS, Coupling
 from palpate.runtime.devices import Device
-from palpate.runtime.hand_evaluator import HandEvaluator
+from palpate.runtime.hand_evaluator import HandEvaluator, Model
 from palpate.runtime.oscillation import OscillationWatch
 from palpate.runtime.passivity import PassivityController
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.realtime import Metronome, Rest
 from palpate.runtime.recording import TickRecorder
 from palpate.runtime.safety import HARDWARE_PATIENCE, Fault, Limits, PlaceCheck, Safety, Stop, stalled
-from palpate.runtime.sensor_noise import quantisation_noise
 from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES, Shared
 from palpate.runtime.stability import FeltStiffness
 from palpate.runtime.swap import Swap
 from palpate.runtime.workspace import HandFrame, Workspace
-from palpate.units import Range
 
-__all__ = ["EDGE", "Loop", "Model"]
+__all__ = ["EDGE", "Loop"]
 
 _PAUSE = 0.05  # s between two ticks of a page or script from which on the clock jumped; hardware bears less
-_AHEAD = (
-    2e-3  # s, at most, before the end of a sample's patience; a slow loop with a late device needs the rest
-)
+# s, at most, before the end of a sample's patience: a slow loop with a late device needs the rest
+_AHEAD = 2e-3
 EDGE = 1.25  # radii of the workspace: no force beyond
 _AIR, _REST = 0.01, 0.05  # radii: as good as outside a pressed body, and as good as at rest of a held one
 _DELAY_TIME = 0.1  # s, over which the age of the samples is averaged
 _DELAY_CHANGE = 0.02  # of T/2 + d: smaller changes move no bound that matters
-
-
-class Model(Protocol):
-    """A learnt body as the loop asks for it; `palpate.runtime.touchable.Touchable` is one."""
-
-    @property
-    def parameters(self) -> tuple[Range, ...]:
-        """The inputs that the hand doesn't supply."""
-        ...
-
-    def evaluator(self) -> HandEvaluator:
-        """Return the allocation-free evaluator."""
-        ...
 
 
 class Loop:
@@ -166,15 +149,7 @@ class Loop:
         self._stops, self._resumes = shared.command.record["stops"], shared.command.record["resumes"]
         self._wished = shared.command.record["parameters"]
         self._orphaned = orphaned
-        self.stages = (
-            self.read,
-            self.guard,
-            self.map,
-            self.evaluate,
-            self.limit,
-            self.control,
-            self.write,
-        )
+        self.stages = (self.read, self.guard, self.map, self.evaluate, self.limit, self.control, self.write)
 
     def _prepare_safety(self, dead_man: bool) -> None:
         """Make all that decides whether there is a force."""
@@ -183,7 +158,7 @@ class Loop:
         self.released, self.open, self.withheld = dead_man, False, Fault.NONE
         self._buttons, self._switch, self._driver_fails = 0, False, False
         reach = traits.reach or 2.0 * traits.radius
-        self._check = PlaceCheck(reach, traits.speed, self.period, traits.noise)
+        self._check = PlaceCheck(reach, traits.speed, self.period, traits.place_noise)
         self.longest = max(HARDWARE_PATIENCE if self.motors else _PAUSE, 2.5 * self.period)
         self._ticked, self._edge = math.nan, EDGE * radius
         # of hardware the force is gone at the end of its patience, and not a tick later
@@ -199,26 +174,16 @@ class Loop:
         traits = self.device.traits
         self.frame = HandFrame(traits.axes)
         self.controlled = self.motors and control
+        mass = traits.mass if self.controlled else 0.0
         self.passivity = PassivityController(
-            self.period,
-            max_force=limits.max_force,
-            mass=traits.mass if self.controlled else 0.0,
-            noise=math.hypot(traits.noise, quantisation_noise(traits.resolution)),
+            self.period, max_force=limits.max_force, mass=mass, noise=traits.place_noise
         )
-        self._own_delay = traits.delay or 0.0
-        self.bounds = FeltStiffness(
-            self.workspace.felt(stiffness),
-            traits.damping,
-            rate,
-            self._own_delay,
-            override,
-            traits.max_stiffness,
-            delay_known=traits.delay is not None or traits.stamped,
-            controlled=self.controlled or not self.motors,
-        )
+        controlled = self.controlled or not self.motors
+        self.bounds = FeltStiffness.on(traits, self.workspace.felt(stiffness), rate, override, controlled)
         self.oscillation = OscillationWatch(self.period, limits.max_force)
         self.coupling = Coupling(hardest=stiffness)
         self._steps = 1 if self.evaluator.remembers else STEPS
+        self._own_delay = self.bounds.delay
         self.take_delay(self._own_delay)
 
     def take_delay(self, delay: float) -> None:
@@ -239,7 +204,7 @@ class Loop:
     def _take_spring(self) -> None:
         self._spring = self.bounds.coupling / self.workspace.scale
         self.coupling.change(self._spring)
-        self.passivity.stiffness = self.bounds.felt
+        self.passivity.stiffness = self.bounds.felt if math.isfinite(self.bounds.felt) else 0.0
         self.out.stiffness(self.bounds)
 
     def run(self, rehearse: Callable[[], None] = lambda: None) -> None:
@@ -480,21 +445,15 @@ class Loop:
             self.workspace.force_on_hand(force, sent)
             free = not self.evaluator.force.any() and not sent.any()
             controller.max_force = self.safety.bearable_force
-            controller.apply(
-                self.out.hand,
-                sent,
-                self.now - self._before,
-                stored=self._stored() / self.workspace.scale,
-                clamped=self.safety.clamped,
-                free=free,
-            )
+            elapsed, stored = self.now - self._before, self._stored() / self.workspace.scale
+            clamped = self.safety.clamped
+            controller.apply(self.out.hand, sent, elapsed, stored=stored, clamped=clamped, free=free)
             if controller.damping > 0.0:
                 self.workspace.force_on_body(sent, force)
             if self.safety.slew():
                 self.workspace.force_on_hand(force, sent)
                 controller.amend(sent)
-            answer = self.bounds.felt * controller.noise
-            if self.motors and self.oscillation.see(sent, answer if math.isfinite(answer) else 0.0):
+            if self.motors and self.oscillation.see(sent, controller.stiffness * controller.noise):
                 self.fail(Fault.UNSTABLE)
                 self.stop.stopped = True  # it would begin again
                 self.safety.stop()

@@ -381,6 +381,7 @@ def _step(state, sent, places, position, force, elapsed, late, device, stored, c
     noise = max(stated, measure_noise(places, position, elapsed))
     state[_NOISE] = noise
     time = _filter_time(noise, period, delay, max_force, mass, stiffness)
+    stored = stored if math.isfinite(stored) else state[_STORED]
     square, balance = 0.0, state[_BALANCE]
     if state[_SEEN] > 0.0:
         share = period / (time + period)

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 from palpate.runtime.devices.page import PageDevice
-from palpate.runtime.hand_evaluator import HandEvaluator
-from palpate.runtime.loop import Loop, Model
+from palpate.runtime.hand_evaluator import HandEvaluator, Model
+from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared, now
 from palpate.runtime.workspace import Workspace

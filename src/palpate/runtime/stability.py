@@ -30,9 +30,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from palpate.errors import UsageError
 from palpate.runtime.coupling import coupling_stiffness
+
+if TYPE_CHECKING:
+    from palpate.runtime.devices.device import Traits
 
 __all__ = ["FeltStiffness", "passive_stiffness", "stable_stiffness"]
 
@@ -108,6 +112,13 @@ class FeltStiffness:
     stated: float = math.inf
     delay_known: bool = True
     controlled: bool = True
+
+    @classmethod
+    def on(cls, traits: Traits, body: float, rate: float, override: bool, controlled: bool) -> FeltStiffness:
+        """Return the stiffness in the hand of a body of `body` N/m on a device of these traits; see above."""
+        known = traits.delay is not None or traits.stamped
+        own, delay = traits.damping, traits.delay or 0.0
+        return cls(body, own, rate, delay, override, traits.max_stiffness, known, controlled)
 
     @property
     def bound(self) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.runtime.safety import HARDWARE_PATIENCE
+from palpate.runtime.sensor_noise import quantisation_noise
 from palpate.runtime.workspace import PLAIN_AXES, Axes
 from palpate.units import parse_quantity
 
@@ -83,6 +84,11 @@ class Traits:
     noise: float = 0.0
     buttons: int = 0
     name: str = ""
+
+    @property
+    def place_noise(self) -> float:
+        """Standard deviation of a place along one axis, rounding included, as stated, m."""
+        return math.hypot(self.noise, quantisation_noise(self.resolution))
 
 
 class Sample:

@@ -57,7 +57,7 @@ export function feel(news: Feel): void {
   const box = element("feel");
   box.hidden = news.words === "";
   const stiff = news.override ? "Not softened, as asked: it may hum or oscillate." : "Softened for this device.";
-  const head = news.body > news.limit ? stiff : "About this device.";
+  const head = news.body > news.limit ? stiff : "Caution.";
   element("feel-head").textContent = head;
   element("feel-words").textContent = capital(news.words);
   const data = { body: news.body, limit: news.limit, felt: news.felt };

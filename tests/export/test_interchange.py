@@ -228,7 +228,7 @@ def test_a_stroke_touches_where_it_is_told_to_and_along_the_normal():
         ("0,0,0.02", None, r"No contact at 0,0,0\.02"),
         ("0,0,0.01", 0.002, r"nearest place of the surface is --at 0,0,0\.$"),
         ("0.5,0,0", None, "nearest place of the surface is --at"),
-        ("nan,0,0", None, "no place of three numbers"),
+        ("nan,0,0", None, "'nan' is no number"),
         (None, 0.06, "leaves the surface"),
     ):
         with pytest.raises(UsageError) as error:

@@ -167,6 +167,7 @@ class CrtkSimulator(ServiceDouble):
         self._latched: dict[str, str] = {}
         self.stamp: dict[str, int] = {}
         self.topics: dict[str, str] = {}
+        self._publishers: dict[str, set[ServerConnection]] = {}
         self._hand = MovedMass(self.settings)
         self._subscribed: dict[ServerConnection, set[str]] = {}
         self._kept: list[str] = []
@@ -271,6 +272,15 @@ class CrtkSimulator(ServiceDouble):
             pass  # a client that is gone takes nothing along
         finally:
             self._subscribed.pop(connection, None)
+            for topic in list(self.topics):
+                self._withdraw(topic, connection)
+
+    def _withdraw(self, topic: str, connection: ServerConnection) -> None:
+        """Forget a client that publishes to a topic, and the topic with the last one."""
+        publishers = self._publishers.get(topic, set())
+        publishers.discard(connection)
+        if not publishers:
+            self.topics.pop(topic, None)
 
     async def _obey(self, connection: ServerConnection, topics: set[str], message: dict[str, Any]) -> None:
         operation, topic = message.get("op"), str(message.get("topic", ""))
@@ -287,8 +297,9 @@ class CrtkSimulator(ServiceDouble):
             topics.discard(topic)
         elif operation == "advertise":
             self.topics[topic] = kind
+            self._publishers.setdefault(topic, set()).add(connection)
         elif operation == "unadvertise":
-            self.topics.pop(topic, None)
+            self._withdraw(topic, connection)
         elif operation == "publish" and topic in self.topics and not self.faults.deaf:
             await self._take(topic, message.get("msg") or {})
 

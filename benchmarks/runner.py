@@ -25,6 +25,7 @@ BENCHMARKS = (
     "device_round_trips",
     "export_speed",
     "faults",
+    "few_rows",
     "filters",
     "hand_drives",
     "latency",

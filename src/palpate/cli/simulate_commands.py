@@ -124,7 +124,7 @@ def crtk(
     as_json: Json = False,
 ) -> None:
     """Run a double of a CRTK arm behind a ROS bridge, until Ctrl-C."""
-    from palpate.runtime.devices.crtk import CrtkSettings
+    from palpate.runtime.devices.crtk_settings import CrtkSettings
     from palpate.runtime.devices.crtk_simulator import CrtkSimulator, CrtkSimulatorSettings
 
     settings = CrtkSimulatorSettings(

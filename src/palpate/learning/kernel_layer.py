@@ -7,6 +7,10 @@ maximise the Gaussian-process likelihood of a part of the data (Rasmussen & Will
 modes sharing kernel and variance, so that the variance drops out: with C = K + λ I and m modes
 
     L = ½ N m log tr(Yᵀ C⁻¹ Y) + ½ m log det C.
+
+T is fitted beforehand in least squares; or its slopes are uncertain too, of a variance τ² over that of the kernel, and
+then C = K + τ² X Xᵀ + λ I (Rasmussen & Williams 2006, section 2.7). A sample that is the mean of several has so much
+less noise: λ I becomes λ diag(noise).
 """
 
 from __future__ import annotations
@@ -18,9 +22,11 @@ from scipy.linalg import lapack
 
 from palpate.network.radial import RadialFunction, radial
 
-__all__ = ["CENTRES_MAX", "KernelLayer", "Metric", "likely_metric", "negative_likelihood"]
+__all__ = ["CENTRES_MAX", "SCALES", "KernelLayer", "Metric", "likely_metric", "negative_likelihood"]
 
-_SCALES = (np.log(1e-3), np.log(30.0))
+SCALES = (np.log(1e-3), np.log(30.0))
+"""Logarithms of the least and the largest input scale."""
+
 _RIDGES = (np.log(1e-11), np.log(10.0))
 STARTS = (1e-5, 0.1)  # ridges from which the likelihood is climbed
 CENTRES_MAX = 2000
@@ -29,15 +35,22 @@ CENTRES_MAX = 2000
 
 @dataclass(frozen=True)
 class Metric:
-    """Radial function, input scales s (n,) and ridge λ of a kernel."""
+    """Radial function, input scales s (n,) and ridge λ of a kernel; τ² of its slopes, infinite if these are fitted."""
 
     radial: RadialFunction
     scales: np.ndarray
     ridge: float
+    slopes: float = np.inf
 
     def kernel(self, X: np.ndarray, Z: np.ndarray) -> np.ndarray:
         """Return K (N, M) between X (N, n) and Z (M, n)."""
         return np.asarray(radial(self.radial, _squares(X * self.scales, Z * self.scales))[0])
+
+    def covariance(self, X: np.ndarray, noise: np.ndarray | float = 1.0) -> np.ndarray:
+        """Return C (N, N) of samples at X (N, n), each of whose noise is `noise` times the ridge."""
+        C = self.kernel(X, X)
+        C[np.diag_indices(len(C))] += self.ridge * noise
+        return C if np.isinf(self.slopes) else C + self.slopes * (X @ X.T)
 
     def altered(self, scale: float, ridge: float) -> Metric:
         """Return the metric with all scales and the ridge multiplied by two factors."""
@@ -58,12 +71,24 @@ class KernelLayer:
         Weights of the units for k outputs.
     tail : (1 + n, k)
         Coefficients of one and of the inputs.
+    noise : (h,) or float
+        Noise variance of each sample over the ridge.
     """
 
     metric: Metric
     centres: np.ndarray
     weights: np.ndarray
     tail: np.ndarray
+    noise: np.ndarray | float = 1.0
+
+    @classmethod
+    def likely(
+        cls, metric: Metric, X: np.ndarray, Y: np.ndarray, noise: np.ndarray | float = 1.0
+    ) -> KernelLayer:
+        """Return the mean of the Gaussian process whose slopes are uncertain too, given X (N, n) and Y (N, k)."""
+        mean = Y.mean(axis=0)
+        weights = _solve_weights(metric.covariance(X, noise), Y - mean)
+        return cls(metric, X, weights, np.vstack([mean, metric.slopes * (X.T @ weights)]), noise)
 
     @classmethod
     def fit(
@@ -131,7 +156,7 @@ def likely_metric(
             args=(name, X, Y),
             jac=True,
             method="L-BFGS-B",
-            bounds=[_SCALES] * n + [_RIDGES],
+            bounds=[SCALES] * n + [_RIDGES],
             options={"maxiter": iterations},
         )
         for ridge in (STARTS if start is None else (start.ridge,))
@@ -141,13 +166,15 @@ def likely_metric(
 
 
 def negative_likelihood(
-    logs: np.ndarray, name: RadialFunction, X: np.ndarray, Y: np.ndarray
+    logs: np.ndarray, name: RadialFunction, X: np.ndarray, Y: np.ndarray, noise: np.ndarray | float = 1.0
 ) -> tuple[float, np.ndarray]:
-    """Return L per number observed and its gradient by log s and log λ."""
+    """Return L per number observed and its gradient by log s, log λ and, where `logs` has it, log τ²."""
     (N, n), m = X.shape, Y.shape[1]
     Z, ridge = X * np.exp(logs[:n]), float(np.exp(logs[n]))
     C, slope, _ = radial(name, _squares(Z, Z))
-    C[np.diag_indices(N)] += ridge
+    C[np.diag_indices(N)] += ridge * noise
+    if len(logs) > n + 1:
+        C += np.exp(logs[n + 1]) * (X @ X.T)
     L, failed = lapack.dpotrf(C, lower=1)
     if failed:
         return 1e10, np.zeros_like(logs)
@@ -160,7 +187,9 @@ def negative_likelihood(
     by_q = by_C * slope
     # Σ_ij M_ij 2 (z_i − z_j)² for symmetric M
     spread = 4.0 * (by_q.sum(axis=1) @ (Z * Z) - np.einsum("ni,ni->i", Z, by_q @ Z))
-    return value / (N * m), np.r_[spread, ridge * np.trace(by_C)] / (N * m)
+    by_slopes = [np.exp(t) * float(((by_C @ X) * X).sum()) for t in logs[n + 1 :]]
+    by_ridge = ridge * float((noise * np.diagonal(by_C)).sum())
+    return value / (N * m), np.r_[spread, by_ridge, by_slopes] / (N * m)
 
 
 def _squares(X: np.ndarray, Z: np.ndarray) -> np.ndarray:

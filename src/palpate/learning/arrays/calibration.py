@@ -20,6 +20,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import stdtrit
@@ -28,20 +29,25 @@ from palpate.learning.arrays.array_samples import ArrayProblem, Samples
 from palpate.learning.arrays.fit_notes import notes_on
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import HeldOut
+from palpate.learning.arrays.influence import Influence
 from palpate.learning.arrays.members import ROWS, Crossed, CrossedLayers
 from palpate.learning.ensemble import Ensemble
-from palpate.learning.kernel_layer import KernelLayer
+from palpate.learning.kernel_layer import KernelLayer, Metric
 from palpate.learning.search import Trial
 from palpate.network import Network, TrainedRegion
 from palpate.network.radial import RadialFunction
 from palpate.network.uncertainty import Uncertainty
 from palpate.rbf.refinement.refine import Refined
 
+if TYPE_CHECKING:
+    from palpate.learning.arrays.few_rows import LeftOut
+
 __all__ = [
     "LARGEST",
     "Evidence",
     "Finish",
     "calibrated",
+    "covariance_rows",
     "kernel_covariance",
     "kernel_spread",
     "mean_root",
@@ -116,19 +122,30 @@ def mean_root(networks: Sequence[Refined], X: np.ndarray) -> np.ndarray:
 
 def kernel_covariance(layer: KernelLayer) -> np.ndarray:
     """Return M (1 + n + h square) with which s² (1 + φ̃ᵀ M φ̃) is the Gaussian process's variance over 1 + λ."""
-    h, n = layer.centres.shape
-    C, ridge = _kernel(layer)
-    M = np.zeros((1 + n + h, 1 + n + h))
-    inverse = np.linalg.inv(C)
-    M[1 + n :, 1 + n :] = -(inverse + inverse.T) / (2.0 * (1.0 + ridge))
-    return M
+    C, metric = _kernel(layer)
+    seen = covariance_rows(layer)
+    M = -seen @ np.linalg.solve(C, seen.T)
+    if not np.isinf(metric.slopes):
+        slopes = np.arange(1, 1 + layer.centres.shape[1])
+        M[slopes, slopes] += metric.slopes
+    return np.asarray((M + M.T) / (2.0 * (1.0 + metric.ridge)))
+
+
+def covariance_rows(layer: KernelLayer) -> np.ndarray:
+    """Return S (1 + n + h, h): what is asked at x covaries with the samples by φ̃ᵀ S."""
+    h = len(layer.centres)
+    slopes = 0.0 if np.isinf(layer.metric.slopes) else layer.metric.slopes
+    return np.vstack([np.zeros((1, h)), slopes * layer.centres.T, np.eye(h)])
 
 
 def kernel_spread(layer: KernelLayer, X: np.ndarray) -> np.ndarray:
     """Return 1 + φ̃ᵀ M φ̃ (N',) at X (N', n)."""
-    C, ridge = _kernel(layer)
-    k = layer.metric.kernel(X, layer.centres)
-    return np.asarray(1.0 - (k * np.linalg.solve(C, k.T).T).sum(axis=1) / (1.0 + ridge))
+    C, metric = _kernel(layer)
+    k, alone = metric.kernel(X, layer.centres), 0.0
+    if not np.isinf(metric.slopes):
+        k = k + metric.slopes * (X @ layer.centres.T)
+        alone = metric.slopes * (X * X).sum(axis=1)
+    return np.asarray(1.0 + (alone - (k * np.linalg.solve(C, k.T).T).sum(axis=1)) / (1.0 + metric.ridge))
 
 
 def calibrated(
@@ -179,12 +196,10 @@ def _rows(network: Refined, X: np.ndarray) -> np.ndarray:
     return np.hstack([r.tail_rows(X), r.phi(X, network.theta)])
 
 
-def _kernel(layer: KernelLayer) -> tuple[np.ndarray, float]:
-    """Return K + λ (h, h) between the centres, and λ."""
-    ridge = max(layer.metric.ridge, _KERNEL_RIDGE)
-    C = layer.metric.kernel(layer.centres, layer.centres)
-    C[np.diag_indices(len(C))] += ridge
-    return C, ridge
+def _kernel(layer: KernelLayer) -> tuple[np.ndarray, Metric]:
+    """Return the covariance (h, h) of the samples at the centres, and its metric."""
+    metric = replace(layer.metric, ridge=max(layer.metric.ridge, _KERNEL_RIDGE))
+    return metric.covariance(layer.centres, layer.noise), metric
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,6 +289,19 @@ class Finish:
         rows = np.concatenate([np.flatnonzero(unseen) for _, unseen in crossed.folds])
         error = crossed.error if error is None else error
         return self._fitted(arrays, layer.metric.radial, "kernel layer", error, M, evidence, rows)
+
+    def few_network(self, candidate: LeftOut) -> Fitted:
+        """Return the result for the network that was best of few rows; every row was left out once."""
+        layer = candidate.layer
+        everything = np.ones(len(candidate.missed), dtype=bool)
+        wanted = self.problem.Y - candidate.missed
+        evidence = Evidence(self._errors(wanted, everything), candidate.spread)
+        arrays = (*layer.units(), layer.weights, layer.tail)
+        rows = np.arange(len(candidate.missed))
+        fitted = self._fitted(
+            arrays, layer.metric.radial, candidate.form, candidate.error, candidate.covariance, evidence, rows
+        )
+        return replace(fitted, influence=Influence(candidate.influence, candidate.means @ evidence.missed))
 
     def _errors(self, latent: np.ndarray, held: np.ndarray) -> np.ndarray:
         """Return errors (N', m) in scaled outputs of latent ones (N', k) at samples of a mask (N,)."""

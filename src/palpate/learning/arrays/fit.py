@@ -16,6 +16,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ import numpy as np
 from palpate.errors import FitWarning
 from palpate.learning.arrays.array_samples import ArrayProblem, Samples, check_search
 from palpate.learning.arrays.calibration import Finish
+from palpate.learning.arrays.few_rows import best_of_few, few_places
 from palpate.learning.arrays.fit_notes import IDLE
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import RIDGE, HeldOut, carry, forms_for
@@ -33,7 +35,6 @@ from palpate.learning.arrays.members import (
     Crossed,
     CrossedLayers,
     Fresh,
-    clearly_less,
     refit_weights,
 )
 from palpate.learning.folds import fold_masks, near_places
@@ -48,6 +49,7 @@ from palpate.units import Quantity, Range
 
 __all__ = ["fit"]
 
+_error = attrgetter("error")  # of a candidate, on held-out samples
 _WORK = 5e11  # multiplications at the default effort, which are half a minute's at most
 _SECONDS = 30.0  # that the default effort is made for: a shorter limit plans for less
 _NUMBERS = 1500  # unknowns in the units of a full-size candidate at the default effort
@@ -56,6 +58,7 @@ _METRIC_SAMPLES = 500  # for the likelihood
 _FOLDS, _ROUNDS = 5, 2  # of the networks learnt crosswise
 _LAYER_FOLDS = 10  # of a kernel layer: its final one learns from all samples, and fewer would say too much
 _STEPS = 15  # of a fold's own likelihood, from the metric of all
+_CROSSED_PLACES = 60  # of fewer no network was ever ahead of a Gaussian process
 _CROSSED_SHARE = 0.5  # of all work, for these
 _BEATEN = 1.3  # times the kernel layer's error: a mean of ten may still miss less
 _BEHIND = 1.2  # times the best error: too far for another ten iterations
@@ -118,7 +121,8 @@ def fit(
 
     Notes
     -----
-    A fifth of the samples (15 % of a thousand and more) is held out to choose by. Then ten networks, or five, are
+    Of fewer than 100 places each is left out once (`palpate.learning.arrays.few_rows`). Of more samples a fifth (15 %
+    of a thousand and more) is held out to choose by. Then ten networks, or five, are
     learnt each without a fifth of the samples, and their mean is handed over: error and intervals are those of the
     networks that had not seen a sample (see `palpate.learning.arrays.calibration`).
 
@@ -148,7 +152,8 @@ def fit(
         if len(places) > MANY_ROWS:
             fitted = _Chooser(*options, RowParts.of(places, seed)).chosen_for_many(workers)
         else:
-            fitted = _Chooser(*options).chosen()
+            chooser = _Chooser(*options)
+            fitted = chooser.chosen_of_few() if few_places(places) else chooser.chosen()
     fitted = replace(fitted, columns=samples.columns)
     for note in fitted.notes:
         if not note.startswith(IDLE):
@@ -173,14 +178,12 @@ class _Chooser:
         parts: RowParts | None = None,
     ) -> None:
         self.problem, self.seed, self.pool = problem, seed, pool
-        # of many rows some are chosen by, in half of the time
-        self.parts = parts
+        self.parts = parts  # of many rows some are chosen by, in half of the time
         rows = slice(None) if parts is None else parts.learn[:SUBSET]
         self.budget = budget if parts is None else budget.part(0.5)
         self.deadline = budget.deadline
         self.X, self.Y, self.places = problem.X[rows], problem.Y[rows], places[rows]
-        # errors are per latent output until they are told
-        self.target = max(target or 0.0, _ROUND_OFF) * problem.unit
+        self.target = max(target or 0.0, _ROUND_OFF) * problem.unit  # per latent output, as all errors
         self.total = _WORK * budget.effort
         self.work = Work(self.total, self.budget.deadline)
         self.size = min(2.0, math.sqrt(budget.effort))
@@ -188,10 +191,10 @@ class _Chooser:
         self.split = self._fold(0)
         self.scales, self.known_scales = np.ones(self.X.shape[1]), False
         self.centres = int(np.clip((0.15 * self.total) ** (1 / 3), 300, CENTRES_MAX))
+        self._layer = partial(KernelLayer.fit, seed=seed, most=self.centres)
         self.trials: list[Trial] = []
         self.ran: list[Candidate] = []
-        # for the networks learnt crosswise
-        self.reserve = _CROSSED_SHARE * self.total
+        self.reserve = _CROSSED_SHARE * self.total  # for the networks learnt crosswise
         self._finish_with = partial(Finish, samples, problem, self.trials, began, seed, level, places)
 
     def chosen(self) -> Fitted:
@@ -209,9 +212,22 @@ class _Chooser:
             return self._kernel_network(metric, mark) if winner.error > mark else self._single(winner)
         if len(self.X) <= self.centres and crossed.error > self.target:
             layers = self._likeliest_layers(metric)
-            if not clearly_less(crossed.gain * crossed.missed, layers.missed[crossed.tested]):
+            if not crossed.clearly_ahead(layers.missed, errors=1.0):
                 return self._last_stage.kernel_network(layers)
         return self._last_stage.mean_network(crossed)
+
+    def chosen_of_few(self) -> Fitted:
+        """Return what misses least of places left out; networks compete where there are enough to learn crosswise."""
+        options: dict[str, Any] = {"target": self.target, "unit": self.problem.unit, "trials": self.trials}
+        best = best_of_few(self.X, self.Y, self.places, budget=self.budget, **options)
+        self.scales = best.layer.metric.scales
+        if best.error > self.target and len(np.unique(self.places)) >= _CROSSED_PLACES:
+            winner = self._winner(mark := float(np.sqrt((best.missed[self.split.held] ** 2).mean())))
+            self.reserve = 0.0
+            crossed = self._finalist(winner) if winner.error <= _BEATEN * mark else None
+            if crossed is not None and crossed.clearly_ahead(best.missed):
+                return self._last_stage.mean_network(crossed)
+        return self._last_stage.few_network(best)
 
     def chosen_for_many(self, workers: int) -> Fitted:
         """Return the network whose kind the subset decides, and whose units and weights learn from all rows."""
@@ -314,9 +330,6 @@ class _Chooser:
         """Return of how many samples a layer is fitted with this share of all work."""
         affordable = min(share * self.total, 0.5 * max(self.work.left, 0.0))
         return min(samples, max(self.centres, int(affordable / self.centres**2)))
-
-    def _layer(self, metric: Metric, X: np.ndarray, Y: np.ndarray) -> KernelLayer:
-        return KernelLayer.fit(metric, X, Y, seed=self.seed, most=self.centres)
 
     def _kernel_network(self, metric: Metric, error: float) -> Fitted:
         if len(self.X) <= self.centres:
@@ -484,9 +497,4 @@ class _Chooser:
 
 
 def _best_of(candidates: Sequence[Candidate]) -> Candidate:
-    """Return the candidate of least error on held-out samples."""
     return min(candidates, key=_error)
-
-
-def _error(candidate: Candidate) -> float:
-    return candidate.error

@@ -12,6 +12,7 @@ import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.learning.arrays.array_samples import points
+from palpate.learning.arrays.influence import Influence
 from palpate.learning.search import Trial
 from palpate.network import Network, TrainedRegion
 from palpate.network.uncertainty import Uncertainty
@@ -31,7 +32,7 @@ class Fitted:
     network : Network
         In SI units, as it answers.
     form : str
-        Of its units: rank-1, rank-2, rotated, axis-aligned; kernel layer; or affine, without units.
+        Of its units: rank-1, rank-2, rotated, axis-aligned; kernel layer; or affine or mean, without units.
     radial : str
         Radial function of its units.
     units : int
@@ -57,6 +58,8 @@ class Fitted:
     columns : tuple of str
         Names of the columns of the table that it was fitted to, by which columns are matched later; those of the
         inputs if empty.
+    influence : Influence, optional
+        How the answers hang on single samples, where these were few.
     """
 
     network: Network
@@ -73,6 +76,7 @@ class Fitted:
     members: tuple[Network, ...] = ()
     notes: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
+    influence: Influence | None = None
 
     def predict(self, X: Any) -> np.ndarray:
         """Return outputs (N, m) at inputs X (N, n); (N,) where Y was.
@@ -137,7 +141,7 @@ class Fitted:
         """Return which of X (N, n) are like the training samples, (N,) bool.
 
         They are as near to a sample as those are to each other, and the networks whose mean answers agree there to
-        three standard deviations.
+        three standard deviations; of few samples, the answers without one of them do, as they do not beside a kink.
 
         Raises
         ------
@@ -146,7 +150,10 @@ class Fitted:
         """
         X = self._points(X)
         far = self.region.distances(self.network.scaling.scale_inputs(X))
-        agree = (self.disagreement(X) <= _ASTRAY * self.uncertainty.deviation(X)).all(axis=1)
+        apart = self.disagreement(X)
+        if self.influence is not None:
+            apart = np.maximum(apart, self.influence.deviation(self.network, X))
+        agree = (apart <= _ASTRAY * self.uncertainty.deviation(X)).all(axis=1)
         # written so that a point that is not a number is not trusted
         return np.asarray((far <= self.region.radius) & agree)
 
@@ -166,6 +173,8 @@ class Fitted:
         if self.members:
             region["member_units"] = np.array([float(member.units) for member in self.members])
             region["member_tails"] = np.stack([member.tail for member in self.members])
+        if self.influence is not None:
+            region |= self.influence.arrays()
         kept = {
             "notes": list(self.notes),
             "form": self.form,
@@ -202,7 +211,9 @@ class Fitted:
     def __str__(self) -> str:
         n, m = len(self.network.inputs), len(self.network.outputs)
         what = (
-            "an affine function"
+            "the mean of the outputs"
+            if self.form == "mean"
+            else "an affine function"
             if not self.units
             else f"{self.units} units, {self.form}, {self.radial}"
             if self.form != "kernel layer"
@@ -266,6 +277,7 @@ def _restored(network: Network) -> Fitted:
         _members(network),
         tuple(str(note) for note in kept.get("notes", ())),
         tuple(str(name) for name in kept.get("columns", ())),
+        Influence.restored(network.extras, network),
     )
 
 

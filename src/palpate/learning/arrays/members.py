@@ -96,6 +96,10 @@ class Crossed:
         """Error to expect of the mean of all, root mean square per latent output."""
         return self.gain * float(np.sqrt((self.missed**2).mean()))
 
+    def clearly_ahead(self, missed: np.ndarray, *, errors: float = 2.0) -> bool:
+        """Return True if the mean of all misses clearly less than another network did of each sample, (N, k)."""
+        return clearly_less(self.gain * self.missed, missed[self.tested], errors=errors)
+
     def spread(self, spread_of: Callable[[Refined, np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
         """Return at the tested samples (J,) the mean spread of the networks that had not seen them.
 
@@ -208,14 +212,14 @@ class CrossedLayers:
         return float(np.sqrt(np.nanmean(self.missed**2)))
 
 
-def clearly_less(missed: np.ndarray, other: np.ndarray) -> bool:
+def clearly_less(missed: np.ndarray, other: np.ndarray, *, errors: float = 1.0) -> bool:
     """Return True if errors (J, k) are less than others at the same samples by more than their difference's own error.
 
-    The mean of the squares' differences is compared with its standard error. What was chosen among many by an error
-    with noise in it has a little luck; so a tie goes to the other.
+    The mean of the squares' differences is compared with so many times its standard error. What was chosen among many
+    by an error with noise in it has a little luck; so a tie goes to the other.
     """
     gain = (other**2).mean(axis=1) - (missed**2).mean(axis=1)
-    return bool(gain.mean() > gain.std() / np.sqrt(len(gain)))
+    return bool(gain.mean() > errors * gain.std() / np.sqrt(len(gain)))
 
 
 @dataclass(frozen=True, eq=False)

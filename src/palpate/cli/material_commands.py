@@ -186,7 +186,9 @@ def _fit_relaxation(tables: SpecimenTables, options: dict[str, Any]) -> Any:
         )
     time, response, unit = tables.relaxation(0)
     units = {"begin": "s", "ramp": "s", "preload": unit}
-    given = {name: to_si(options[name], own) for name, own in units.items() if options[name] is not None}
+    given: dict[str, Any] = {
+        name: to_si(options[name], own) for name, own in units.items() if options[name] is not None
+    }
     return fit_relaxation(time, response, **given)
 
 

@@ -327,7 +327,7 @@ def read_table(
             )
         else:
             text, note = read_table_text(path, encoding)
-            notes, comments = [note] if note else [], []
+            notes, comments = [note] if note else [], list[tuple[int, str]]()
             if is_labview(text):
                 rows, mark, own, more = labview_rows(text)
                 rows, decimal = [row for row in rows if last is None or row.line <= last], decimal or own

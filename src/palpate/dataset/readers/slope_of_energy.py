@@ -113,8 +113,8 @@ def _axis_warning(turned: Sequence[str], name: str) -> str:
     """Return the warning of single inputs along which the response has another sign."""
     return (
         f"Warning: energy and response contradict each other: along {' and '.join(turned)} the response has another "
-        f"sign than the slope −∂({name})/∂(input), along the others the same. Likely cause: an axis of the response that "
-        'points the other way. Correct it in the mapping: "from", or the sign of that column in the file.'
+        f"sign than the slope −∂({name})/∂(input), along the others the same. Likely cause: an axis of the response "
+        'that points the other way. Correct it in the mapping: "from", or the sign of that column in the file.'
     )
 
 

@@ -67,7 +67,7 @@ def held_record(
     UsageError
         If the hold's begin is not known, or lies behind the record.
     """
-    rise = _rise(time, response)
+    rise = _find_rise(time, response)
     notes = []
     if begin is None and rise is None:
         _check_clock(time)
@@ -115,7 +115,7 @@ def _check_clock(time: np.ndarray) -> None:
     )
 
 
-def _rise(t: np.ndarray, response: np.ndarray) -> tuple[float, float, float | None] | None:
+def _find_rise(t: np.ndarray, response: np.ndarray) -> tuple[float, float, float | None] | None:
     """Return begin and end of the rise in s, and the level before it, None where no row tells; None without a rise."""
     sign = 1.0 if np.median(response) >= 0 else -1.0
     y = sign * response

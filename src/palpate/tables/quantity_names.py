@@ -16,8 +16,9 @@ _QUANTITIES = {
     "time": "time t zeit prüfzeit temps tiempo",
     "force": "force load f kraft standardkraft prüfkraft last charge fuerza carga",
     "depth": "depth indentation penetration eindringtiefe eindringung tiefe profondeur profundidad",
-    "extension": "extension displacement elongation crosshead position travel deflection stroke way weg standardweg "
-    "traversenweg prüfweg kolbenweg verformung verlängerung längenänderung allongement déplacement desplazamiento",
+    "extension": "extension ext displacement displ disp elongation crosshead position travel deflection stroke way weg "
+    "standardweg traversenweg prüfweg kolbenweg verformung verlängerung längenänderung allongement déplacement "
+    "desplazamiento",
     "strain": "strain eps ε e dehnung stauchung déformation deformación",
     "stretch": "stretch lambda λ streckung étirement",
     "stress": "stress s spannung contrainte esfuerzo tensión sigma σ p pk1",
@@ -28,7 +29,6 @@ _COMPOUNDS = {  # a quantity and a direction in one word
     "druckspannung": "compressive stress",
     "druckdehnung": "compressive strain",
     "stauchung": "compressive strain",
-    "compression": "compressive extension",
     "stauchweg": "compressive extension",
     "zugkraft": "tensile force",
     "zugspannung": "tensile stress",
@@ -40,35 +40,17 @@ _COMPOUNDS = {  # a quantity and a direction in one word
     "p": "nominal stress",
     "pk1": "nominal stress",
 }
-_COMPRESSIVE = {"compressive", "compression", "compr"}
-_TENSILE = {"tensile", "tension"}
-_NOMINAL = {"nominal", "engineering", "eng", "technische", "piola"}
-_TRUE = {"true", "cauchy", "wahre", "log", "logarithmic", "hencky", "logarithmische"}
-_NEUTRAL = {
-    "axial",
-    "measured",
-    "corrected",
-    "machine",
-    "cell",
-    "channel",
-    "sensor",
-    "transducer",
-    "standard",
-    "actual",
+_DIRECTIONS = {"compressive": {"compressive", "compression", "compr"}, "tensile": {"tensile", "tension"}}
+_MEASURES = {
+    "nominal": {"nominal", "engineering", "eng", "technische", "piola"},
+    "true": {"true", "cauchy", "wahre", "log", "logarithmic", "hencky", "logarithmische"},
 }
-_NEUTRAL |= {
-    "ratio",
-    "elapsed",
-    "test",
-    "total",
-    "uniaxial",
-    "normal",
-    "gauge",
-    "extensometer",
-    "crosshead",
-    "value",
-}
-_NEUTRAL |= {"traverse", "grip", "running", "run", "x", "of", "the"}
+_UNITS = {"n", "mn", "kn", "mm", "µm", "um", "m", "s", "ms", "sec", "pa", "kpa", "mpa", "pct", "percent", "%"}
+_CHANGE_NOTHING = (
+    "axial measured corrected machine cell channel sensor transducer standard actual elapsed test total uniaxial "
+    "normal gauge extensometer crosshead traverse grip running run"
+)
+_KNOWN = frozenset(_CHANGE_NOTHING.split()).union(*_MEASURES.values(), *_DIRECTIONS.values())
 
 
 @dataclass(frozen=True)
@@ -104,27 +86,32 @@ def named_quantity(name: str) -> NamedQuantity | None:
     NamedQuantity or None
         None where the name states none, or has words that are not known: "strain rate" is no strain.
     """
-    text = re.sub(r"[\s_\-–.,:/#]+", " ", name.casefold())
-    inside = re.findall(r"\(([^()]*)\)", text)
-    words = re.sub(r"\([^()]*\)", " ", text).split()
-    words = [part for word in words for part in _COMPOUNDS.get(word, word).split()] if words else []
-    return _quantity_of(words, [word for part in inside for word in part.split()])
+    text, inside = re.sub(r"[\s_\-–.,:/#]+", " ", name.casefold()), ""
+    while match := re.search(r"\(([^()]*)\)", text):
+        text, inside = text.replace(match[0], " "), f"{inside} {match[1]}"
+    words = text.split()
+    if len(words) > 1 and words[-1] in _UNITS:  # Force_N
+        words.pop()
+    if words == ["compression"]:
+        words = ["compressive", "extension"]
+    words = [part for word in words for part in _COMPOUNDS.get(word, word).split()]
+    return _quantity_of(words, inside.split())
 
 
 def _quantity_of(words: list[str], bracketed: list[str]) -> NamedQuantity | None:
     """Return the quantity of words; those in brackets tell a measure, such as (log), or a channel."""
     words = [word for word in words if not word.isdigit()]
-    if words[:1] and words[0] == "extension" and "ratio" in words:
-        words = ["stretch", *(word for word in words[1:] if word != "ratio")]
-    if "indentation" in words and len(set(words) & _BASES.keys()) > 1:  # indentation depth, indentation force
-        words = [word for word in words if word != "indentation"]
-    if "crosshead" in words and len(set(words) & _BASES.keys()) > 1:
-        words = [word for word in words if word != "crosshead"]
-    bases = [_BASES[word] for word in words if word in _BASES]
+    if "ratio" in words and {"stretch", "extension"} & set(words):
+        words = ["stretch" if word == "extension" else word for word in words if word != "ratio"]
+    for word in ("indentation", "crosshead"):  # indentation depth, crosshead travel
+        if word in words and len(set(words) & _BASES.keys()) > 1:
+            words = [other for other in words if other != word]
+    bases = {_BASES[word] for word in words if word in _BASES}
     states = {word for word in words if word not in _BASES}
-    measures = [m for m, known in (("nominal", _NOMINAL), ("true", _TRUE)) if known & {*states, *bracketed}]
-    directions = [d for d, known in (("compressive", _COMPRESSIVE), ("tensile", _TENSILE)) if known & states]
-    known = _COMPRESSIVE | _TENSILE | _NOMINAL | _TRUE | _NEUTRAL
-    if len(set(bases)) != 1 or not states <= known or len(measures) > 1 or len(directions) > 1:
+    measures, directions = (
+        [name for name, synonyms in table.items() if synonyms & {*states, *bracketed}]
+        for table in (_MEASURES, _DIRECTIONS)
+    )
+    if len(bases) != 1 or not states <= _KNOWN or len(measures) > 1 or len(directions) > 1:
         return None
-    return NamedQuantity(bases[0], "".join(measures), "".join(directions))
+    return NamedQuantity(bases.pop(), "".join(measures), "".join(directions))

@@ -136,3 +136,27 @@ def test_a_clock_that_runs_before_the_record_is_asked_for(spacing):
         5.0 + spacing, record(5.0 + spacing, TERMS[1:]), begin=0.0
     )  # it says: from the rise on
     assert late.instantaneous == pytest.approx(9e3, rel=0.05)
+
+
+@pytest.mark.parametrize("rows", [1, 5, 20])
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_hold_ends_where_the_specimen_is_let_go_or_stretched_again(rows, noise, sign):
+    t, y = machine_record(20, 0.5, noise, start=0.0)
+    share = np.clip((t - 50.0) * 20 / rows, 0.0, 1.0)
+    for end, said in ((y * (1 - share), "falls off"), (y * (1 + share), "rises again")):
+        found = fit_relaxation(t, sign * end)
+        assert found.equilibrium == pytest.approx(sign * 6.3e3, rel=0.01)
+        assert found.time[-1] == pytest.approx(47.5, abs=1.0)
+        note = next(note for note in found.notes if said in note)
+        assert f"{len(t) - np.searchsorted(t, 2.5 + found.time[-1] + 0.01)} rows" in note
+
+
+def test_a_record_of_two_steps_tells_that_the_second_has_the_first_beneath():
+    t, y = machine_record(20, 0.5, start=0.0)
+    second = y + np.interp(t - 30.0, t, y - 200, left=0.0)
+    first = fit_relaxation(t, second)
+    assert first.instantaneous == pytest.approx(9e3, rel=0.01)
+    later = fit_relaxation(t, second, begin=32.5)
+    assert later.ramp == pytest.approx(0.5, rel=0.1)
+    assert any("which goes on relaxing beneath it" in note for note in later.notes)

@@ -16,7 +16,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.format import count
 
-__all__ = ["Run", "load_runs", "rows_of_cycle"]
+__all__ = ["Run", "load_runs", "rows_of_cycle", "turning_points"]
 
 _TURN = 0.05  # of the range of the deformation
 _FEWEST = 4  # rows of a run, with its ends
@@ -37,7 +37,7 @@ def load_runs(deformation: np.ndarray) -> list[Run]:
 
     A record that never turns has none, nor have rows in no order of loading.
     """
-    turns = _turns(deformation)
+    turns = turning_points(deformation, _TURN * float(np.ptp(deformation)))
     if len(turns) < 3 or len(deformation) < _FEWEST * (len(turns) - 1):
         return []
     runs = []
@@ -111,9 +111,8 @@ def rows_of_cycle(deformation: np.ndarray, choice: str | None) -> tuple[np.ndarr
     )
 
 
-def _turns(x: np.ndarray) -> list[int]:
-    """Return the indices of the first row, of every turn of more than a share of the range, and of the last row."""
-    threshold = _TURN * np.ptp(x)
+def turning_points(x: np.ndarray, threshold: float) -> list[int]:
+    """Return the indices of the first row, of every turn by more than a threshold, and of the last row."""
     turns, low, high, way = [0], 0, 0, 0
     for i, value in enumerate(x.tolist()):
         high = i if value > x[high] else high

@@ -51,9 +51,7 @@ def test_force_and_energy_that_fit_are_not_spoken_of(tmp_path, count, noise, fla
     assert "Warning" not in notes(tmp_path, *touches(count, noise=noise, flat=flat))
 
 
-@pytest.mark.parametrize("count", [12, 40, 400])
-@pytest.mark.parametrize("noise", [0.0, 0.1])
-@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize(("count", "noise", "flat"), [(12, 0.0, True), (40, 0.1, False), (400, 0.1, True)])
 @pytest.mark.parametrize(
     ("change", "said", "cause"),
     [
@@ -119,7 +117,7 @@ def test_loads_and_deflections_are_compared_alike(tmp_path):
 @pytest.mark.parametrize("seed", range(8))
 def test_cases_in_the_air_are_no_contradiction(tmp_path, seed):
     place, force, energy = touches(14, seed=seed, flat=True)
-    lifted = place + [0.0, 0.0, 0.004]  # two of three don't touch
+    lifted = place + np.array([0.0, 0.0, 0.004])  # two of three don't touch
     depth = np.maximum(0.06 - lifted[:, 2], 0.0)
     force[:, 2], energy = STIFFNESS * depth**1.5, 0.4 * STIFFNESS * depth**2.5
     assert "Warning" not in notes(tmp_path, lifted, force, energy)

@@ -64,15 +64,16 @@ def test_another_word_among_numbers_is_told(tmp_path):
 HEAD = "Time\tx\ty\tz\tFz\n{}\tmm\tmm\tmm\tN\n"
 
 
-def blocks(second=HEAD, time="Sec"):
+def blocks(second=HEAD, first=HEAD, time="Sec"):
     rows = [f"{0.1 * i:.5f}\t50\t50\t{59.5 - 0.25 * i:.3f}\t{0.013 * i**1.5:.5f}\n" for i in range(9)]
     above = "\nData Acquisition: Cycle {}\tTime: {} Sec\n"
-    text = "Test controller export\nDate:\t03/12/2024\n" + above.format(1, 0) + HEAD.format(time)
+    text = "Test controller export\nDate:\t03/12/2024\n" + above.format(1, 0) + first.format(time)
     return text + "".join(rows[:5]) + above.format(2, 0.5) + second.format(time) + "".join(rows[5:])
 
 
-def test_blocks_of_one_head_are_one_table(tmp_path):
-    found = read_measurements(write(tmp_path, blocks()))
+@pytest.mark.parametrize("head", [HEAD, HEAD.replace("mm", "(mm)").replace("N\n", "[N]\n")])
+def test_blocks_of_one_head_are_one_table(tmp_path, head):
+    found = read_measurements(write(tmp_path, blocks(head, first=head)))
     np.testing.assert_allclose(found.time, 0.1 * np.arange(9))
     np.testing.assert_allclose(found.position[:, 2], 0.0595 - 0.00025 * np.arange(9))
     assert "stands again in lines 14, 15" in " ".join(found.notes)

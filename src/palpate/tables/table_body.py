@@ -6,6 +6,7 @@ Mean, maximum and the like beside the readings are none, in whatever column thei
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,7 +25,7 @@ _STATISTIC = re.compile(
     r"|moyenne|écart[ -]type|médiane|somme|media|mediana|mínimo|máximo|desviación|varianza|suma)"
     r"(?![^\W\d_]).*|[ns]|x̄|ø|σ|ν"
 )
-_LETTER = re.compile(r"[^\W\d_]")
+_NUMERIC = frozenset("0123456789+-−.,")  # what a number begins with
 
 
 def readings_of(
@@ -106,7 +107,12 @@ def check_widths(
 
 
 def _is_word(cell: str) -> bool:
-    return _LETTER.match(cell) is not None and not is_missing(cell)
+    return cell != "" and cell[0] not in _NUMERIC and not is_missing(cell)
+
+
+@functools.lru_cache(maxsize=1024)
+def _is_statistic(cell: str) -> bool:
+    return _STATISTIC.fullmatch(" ".join(cell.split()).casefold()) is not None
 
 
 def _is_text(cell: str) -> bool:
@@ -118,17 +124,18 @@ def _repeated_heads(
 ) -> tuple[set[int], set[int]]:
     """Return the indices of rows that say what the head says, and of the lines that each block has above them."""
     same = {_filled(row) for row in (head.names, head.units, *head.others, *head.groups) if row is not None}
-    heads = {i for i in words if _filled(rows[i]) in same}
+    firsts = {cells[0] for cells in same if cells}
+    heads = {i for i in words if rows[i].cells[0] in firsts and _filled(rows[i]) in same}
     above: set[int] = set()
     for i in heads:
         if _filled(rows[i]) == _filled(head.names):
             above |= set(range(_end_of_block(rows, i, columns), i)) - heads
     width = len(head.names.cells)
     for i in words:
-        if i in heads | above or len(columns) < 2:
+        if len(columns) < 2 or not _is_word(rows[i].cells[min(columns[0], len(rows[i].cells) - 1)]):
             continue
         cells = [rows[i].cells[j] if j < len(rows[i].cells) else "" for j in columns]
-        if all(map(_is_text, cells)) and could_name(rows[i], width):
+        if i not in heads | above and all(map(_is_text, cells)) and could_name(rows[i], width):
             raise _other_head(rows, i, head, columns, is_units=is_row_of_units(rows[i], width))
     return heads, above
 
@@ -171,7 +178,7 @@ def _statistics(rows: Sequence[Row], words: Sequence[int], columns: Sequence[int
     found: dict[int, dict[int, str]] = {}
     for i in words:
         for j, cell in enumerate(rows[i].cells):
-            if _is_word(cell) and _STATISTIC.fullmatch(" ".join(cell.split()).casefold()):
+            if cell != "" and cell[0] not in _NUMERIC and _is_statistic(cell) and not is_missing(cell):
                 found.setdefault(j, {})[i] = cell
     left_out: dict[int, str] = {}
     for j, cells in found.items():

@@ -73,7 +73,7 @@ def held_record(
     """
     sign = 1.0 if np.median(response) >= 0 else -1.0
     first, peak, stop = _rows_of_hold(time, sign * response, begin)
-    rise = _find_rise(time[first:stop], sign * response[first:stop], peak - first)
+    rise = _find_ramp(time[first:stop], sign * response[first:stop], peak - first)
     if begin is None and rise is None:
         _check_clock(time)
     start = begin if begin is not None else rise[1] if rise else 0.0
@@ -178,7 +178,7 @@ def _check_clock(time: np.ndarray) -> None:
     )
 
 
-def _find_rise(t: np.ndarray, y: np.ndarray, peak: int) -> tuple[float, float, float | None] | None:
+def _find_ramp(t: np.ndarray, y: np.ndarray, peak: int) -> tuple[float, float, float | None] | None:
     """Return begin and end of the rise to a peak in s, and the level before it, None where no row tells.
 
     Without a rise, or without rows of a hold after it, all is None.

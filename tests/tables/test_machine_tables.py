@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -177,6 +179,13 @@ def test_a_labview_measurement_is_read(tmp_path, columns, mark, decimal, segment
     if columns != "Multi":
         np.testing.assert_allclose(table.values("X_Value"), 0.1 * count, atol=1e-12)
     assert (f"{segments} segments" in " ".join(table.notes)) == (segments > 1)
+
+
+def test_segments_whose_time_begins_anew_are_told(tmp_path):
+    text = labview("No", segments=3)
+    assert "begins anew" not in " ".join(read_table(write(tmp_path, text, "bench.lvm")).notes)
+    again = re.sub(r"(X0\t)[\d.]+", r"\g<1>0.0", text)
+    assert "Time [s] begins anew in each" in " ".join(read_table(write(tmp_path, again, "bench.lvm")).notes)
 
 
 def test_a_damaged_labview_measurement_is_refused(tmp_path):

@@ -6,11 +6,13 @@ and start and step of its abscissa where none is written. Segments of the same c
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from palpate.errors import UsageError
+from palpate.format import by_number
 from palpate.tables.table_layout import Row
 
 __all__ = ["is_labview", "labview_rows"]
@@ -82,12 +84,19 @@ def labview_rows(text: str) -> tuple[list[Row], str, str, list[str]]:
     width = len(heads[0])
     top = segments[0].line
     found = [Row(top - 1, tuple(segments[0].labels[:width])), Row(top, tuple(heads[0]))]
+    begins: list[float] = []
     for segment in segments:
-        found += _data(segment, width, written, decimal)
+        data = _data(segment, width, written, decimal)
+        begins.append(_number(data[0].cells[0], decimal))
+        found += data
     notes = []
     if len(segments) > 1:
-        where = ", ".join(str(s.line) for s in segments[:5]) + (", …" if len(segments) > 5 else "")
-        notes.append(f"{len(segments)} segments below lines {where} are read one after another.")
+        where = by_number("line", [segment.line for segment in segments])
+        again = any(b <= a for a, b in itertools.pairwise(begins))
+        notes.append(
+            f"{len(segments)} segments below {where} are read one after another"
+            + (f"; their {heads[0][0]} begins anew in each." if again else ".")
+        )
     return found, separator, decimal, notes
 
 

@@ -120,7 +120,7 @@ def test_numbers_are_what_the_whole_table_says_they_are(tmp_path, text, values):
         ("a;b\n1,5;2\n2,x;3\n", "line 3: Column 1 (a) holds '2,x'", "decimal="),
         ("a,b\n1,2\n3\n", "line 3: 1 values stand where 2 belong", "last="),
         ("a,b\n1,2\n3,4,5\n", "line 3: 3 values", "header="),
-        ("a;b\n1;2\nMean;2\n", "line 3: Column 1 (a) holds 'Mean'", "--last"),
+        ("a;b\n1;2\nBreak;2\n", "line 3: Column 1 (a) holds 'Break'", "--last"),
         ("a,b\n1,2\n3,1e999\n", "line 3: Column 2 (b) holds '1e999'", ""),
         ('a,b\n"1,2\n3,4\n', "line 2: a double quote opens a cell and does not close it", ""),
         ("a [mm],b [N]\nm,N\n1,2\n", "line 2: column 'a' is in m, in line 1 in mm", ""),
@@ -149,7 +149,7 @@ def test_what_is_not_certain_is_refused_with_line_and_remedy(tmp_path, text, sai
 def test_options_settle_what_is_not_certain(tmp_path):
     assert read(tmp_path, "a;b\n1,234;2\n", decimal=",").values("a") == 1.234
     assert read(tmp_path, "a;b\n1,234;2\n", decimal=".").values("a") == 1234
-    assert len(read(tmp_path, "a;b\n1;2\nMean;2\n", last=2)) == 1
+    assert len(read(tmp_path, "a;b\n1;2\nBreak;2\n", last=2)) == 1
     assert read(tmp_path, "m;s\nt;F\nx;y\n1;2\n", header=2).names == ("t", "F")
     assert read(tmp_path, "a;b,c\n1;2,3\n", separator=";").names == ("a", "b,c")
     assert read(tmp_path, "a b\n1 2\n", separator="space").names == ("a", "b")

@@ -25,7 +25,9 @@ import numpy as np
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
 from palpate.format import by_number
+from palpate.tables.labview import is_labview, labview_rows
 from palpate.tables.numerals import Numerals
+from palpate.tables.table_body import check_widths, readings_of, words_among_numbers
 from palpate.tables.table_layout import (
     Head,
     Row,
@@ -276,7 +278,8 @@ def read_table(
     Parameters
     ----------
     path : path
-        Text with cells between commas, semicolons, tabs, bars or blanks, or a workbook ``.xlsx``.
+        Text with cells between commas, semicolons, tabs, bars or blanks, a LabVIEW measurement ``.lvm``, or a
+        workbook ``.xlsx``.
     encoding : str, optional
         Encoding of a text file, such as "latin-1". By default found from the bytes.
     separator : str, optional
@@ -307,6 +310,7 @@ def read_table(
     path = Path(path)
     if decimal not in {None, ".", ","}:
         raise UsageError(f"The decimal mark is {decimal!r}.", fix="Choose '.' or ','.")
+    mark: str | None = None
     try:
         if path.suffix.lower() in _WORKBOOKS:
             from palpate.tables.workbook import workbook_rows
@@ -323,11 +327,17 @@ def read_table(
             )
         else:
             text, note = read_table_text(path, encoding)
-            lines, comments, stated = split_comments(text)
-            lines = lines if last is None else [line for line in lines if line[0] <= last]
-            mark = choose_separator(lines, stated if separator is None else separator)
-            rows = list(rows_of(lines, mark))
-            table = _table(path, rows, comments, mark, decimal, header, [note] if note else [])
+            notes, comments = [note] if note else [], list[tuple[int, str]]()
+            if is_labview(text):
+                rows, mark, own, more = labview_rows(text)
+                rows, decimal = [row for row in rows if last is None or row.line <= last], decimal or own
+                notes += more
+            else:
+                lines, comments, stated = split_comments(text)
+                lines = lines if last is None else [line for line in lines if line[0] <= last]
+                mark = choose_separator(lines, stated if separator is None else separator)
+                rows = list(rows_of(lines, mark))
+            table = _table(path, rows, comments, mark, decimal, header, notes)
     except FileFormatError:
         raise
     except UsageError as error:
@@ -355,21 +365,24 @@ def _table(
             fix=_MAKE,
         )
     if header is not None:
-        first = max(first, sum(row.line <= header for row in rows))
+        start = sum(row.line <= header for row in rows)
+        first = max(first, start + body_of(rows[start:])[0])
     head = head_of(rows, first, comments, separator, header)
-    data = _data(rows[first:], head, notes)
+    data, left_out = readings_of(rows[first:], head, numeric)
+    notes += left_out
     if not data:
         raise FileFormatError(f"{path} holds no rows of numbers below its head.", fix=_MAKE)
     width = head.names.filled if head else 0
     for row in data:
         if len(row.cells) > width:
             width = max(width, row.filled)
-    _check_widths(path, data, width, head, separator)
+    check_widths(path, data, width, head, separator)
     cells = tuple(itertools.islice(itertools.zip_longest(*(row.cells for row in data), fillvalue=""), width))
     columns = tuple(
         c for c in _columns(path, head, width) if head is None or c.name or any(cells[c.position - 1])
     )
     columns = tuple(c if c.name else replace(c, name=f"column {c.position}") for c in columns)
+    notes += words_among_numbers(data, numeric, {c.position - 1: c.name for c in columns})
     if head is None:
         notes.append(f"No line names the columns: they are called {columns[0].name} to {columns[-1].name}.")
     elif head.skipped:
@@ -381,38 +394,6 @@ def _table(
     else:
         numerals = Numerals(decimal)
     return Table(path, columns, cells, lines, numerals, tuple(notes))
-
-
-def _data(rows: Sequence[Row], head: Head | None, notes: list[str]) -> list[Row]:
-    """Return the rows of data; empty ones and repetitions of the head are left out."""
-    heads = {row.cells for row in (head.names, head.units) if row is not None} if head else set()
-    data = [row for row in rows if row.filled and row.cells not in heads]
-    repeated = sum(row.cells in heads for row in rows)
-    if repeated:
-        notes.append(f"The head is repeated {repeated} times further down: left out.")
-    return data
-
-
-def _check_widths(
-    path: Path, data: Sequence[Row], width: int, head: Head | None, separator: str | None
-) -> None:
-    """Refuse rows that have fewer cells than others, or more than there are names."""
-    named = head.names.filled if head else width
-    room = max(named, len(head.names.cells)) if head else width  # names of the last columns may be empty
-    for row in data:
-        if named <= len(row.cells) <= room:
-            continue
-        if len(row.cells) < named or row.filled > room:
-            comma = (
-                " If commas are decimal marks too, the cells can't be told apart." if separator == "," else ""
-            )
-            number = max(row.filled, min(len(row.cells), named))
-            raise FileFormatError(
-                f"{path}, line {row.line}: {number} values stand where {named} belong.",
-                why="Between which cells one is missing or too much can't be known." + comma,
-                fix="Correct the line. If it is none of the table, say where that ends: last=… (--last). If marks or "
-                "names were taken wrongly, state them: separator=… (--separator), header=… (--header).",
-            )
 
 
 def _columns(path: Path, head: Head | None, width: int) -> tuple[Column, ...]:

@@ -18,7 +18,17 @@ from palpate.errors import UsageError
 from palpate.tables.numerals import is_missing, is_numeral
 from palpate.tables.unit_names import is_unit
 
-__all__ = ["Head", "Row", "body_of", "choose_separator", "head_of", "rows_of", "split_comments"]
+__all__ = [
+    "Head",
+    "Row",
+    "body_of",
+    "choose_separator",
+    "could_name",
+    "head_of",
+    "is_row_of_units",
+    "rows_of",
+    "split_comments",
+]
 
 _RULE = re.compile(r"[\s|+:;,-]*(?:-{3,}|={3,})[\s|+:;,=-]*")  # a line drawn under a head
 _COMMENT = re.compile(r'\s*"?\s*[#%]+')
@@ -219,10 +229,11 @@ def _first_of(rows: Sequence[Row], first: int) -> int:
     while above > 0 and any(map(is_numeral, rows[above - 1].cells)) and len(rows[above - 1].cells) == width:
         above -= 1
     # without a row of names above them they are lines of a preamble
-    return above if above and _could_name(rows[above - 1], width) else first
+    return above if above and could_name(rows[above - 1], width) else first
 
 
-def _could_name(row: Row, width: int) -> bool:
+def could_name(row: Row, width: int) -> bool:
+    """Return true of a row that has words, and no number, for most of so many columns."""
     filled = sum(1 for cell in row.cells if cell)
     return (
         not any(map(is_numeral, row.cells))
@@ -263,11 +274,11 @@ def head_of(
     if line is not None:
         return _stated_head(above, comments, separator, line, width)
     block = [row for row in above if row.filled and not any(map(is_numeral, row.cells))]
-    while block and not _could_name(block[0], width):
+    while block and not could_name(block[0], width):
         if block[0].filled > 1 and len(block) > 1 and len(block[0].cells) >= width - 1:
             break  # names of groups of columns
         block.pop(0)  # a title
-    if any(_could_name(row, width) for row in block):
+    if any(could_name(row, width) for row in block):
         return _arranged(block, width)
     last = rows[first].line if first < len(rows) else (rows[-1].line + 1 if rows else 1)
     noted = [_comment_row(n, text, separator, width) for n, text in comments if not rows or n < last]
@@ -275,7 +286,7 @@ def head_of(
     if not fitting:
         return None
     # of comments only the last ones can be a head
-    return _arranged(fitting[-2:] if _is_row_of_units(fitting[-1], width) else fitting[-1:], width)
+    return _arranged(fitting[-2:] if is_row_of_units(fitting[-1], width) else fitting[-1:], width)
 
 
 def _stated_head(
@@ -284,7 +295,7 @@ def _stated_head(
     places = {row.line: i for i, row in enumerate(above)}
     if line in places:
         i = places[line]
-        units = above[i + 1] if i + 1 < len(above) and _is_row_of_units(above[i + 1], width) else None
+        units = above[i + 1] if i + 1 < len(above) and is_row_of_units(above[i + 1], width) else None
         return Head(above[i], units)
     for number, text in comments:
         if number == line and (row := _comment_row(number, text, separator, None)) is not None:
@@ -309,7 +320,8 @@ def _comment_row(number: int, text: str, separator: str | None, width: int | Non
     return row if width is None or (row.filled == width and row.filled) else None
 
 
-def _is_row_of_units(row: Row, width: int) -> bool:
+def is_row_of_units(row: Row, width: int) -> bool:
+    """Return true of a row half of whose words, or more, are units."""
     cells = [cell for cell in row.cells if cell]
     units = sum(is_unit(cell, among_words=True) for cell in cells)
     return bool(cells) and 2 * units >= len(cells) and len(cells) <= max(width, 1) + 1
@@ -318,8 +330,8 @@ def _is_row_of_units(row: Row, width: int) -> bool:
 def _arranged(block: list[Row], width: int) -> Head:
     """Return the roles of rows of words above the data."""
     units, rest = None, block
-    naming = [i for i, row in enumerate(block) if _could_name(row, width)]
-    if len(block) > 1 and naming[0] < len(block) - 1 and _is_row_of_units(block[-1], width):
+    naming = [i for i, row in enumerate(block) if could_name(row, width)]
+    if len(block) > 1 and naming[0] < len(block) - 1 and is_row_of_units(block[-1], width):
         units, rest = block[-1], block[:-1]
     most = max(sum(map(bool, row.cells)) for row in rest)
     at = max(i for i, row in enumerate(rest) if sum(map(bool, row.cells)) == most)

@@ -23,6 +23,21 @@ _PURE = {"", "-", "–", "—", "1", "none", "dimensionless"}
 _PREFIXED = "m|s|g|N|Pa|J|W|V|A|K|Hz|mol|Ohm|L|l|gf|bar|rad"
 _BARE = "min|h|deg|°|°C|degC|degF|°F|in|inch|ft|lb|lbf|psi|rpm|%|C|sec|atm|eV|cycles?|rev"
 _SYMBOL = re.compile(rf"(?:(?:da|[fpnuµmcdhkMGT])?(?:{_PREFIXED})|{_BARE})")
+_WORDS = {
+    **dict.fromkeys(("sec", "secs", "second", "seconds", "sekunde", "sekunden"), "s"),
+    **dict.fromkeys(("msec", "msecs", "milliseconds"), "ms"),
+    **dict.fromkeys(("mins", "minute", "minutes", "minuten"), "min"),
+    **dict.fromkeys(("hr", "hrs", "hour", "hours", "stunden"), "h"),
+    **dict.fromkeys(("newton", "newtons"), "N"),
+    **dict.fromkeys(("volt", "volts"), "V"),
+    **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres"), "mm"),
+    **dict.fromkeys(("pct", "percent", "prozent"), "%"),
+    **dict.fromkeys(("count", "counts", "cts", "samples", "#"), "1"),
+}
+"""Words and abbreviations that machines write for a unit, in lower case."""
+_CAPITALS = {"SEC": "s", "MM": "mm", "KN": "kN", "KPA": "kPa", "MPA": "MPa", "GPA": "GPa"}
+"""Spellings of machines without small letters; of small ones mPa is another unit."""
+_LETTERS = re.compile(r"[^\W\d_]+|#")
 _PARTS = re.compile(r"[\s·⋅*/().]+")
 _POWER = re.compile(r"(?:\*\*|\^)?[-⁻]?[\d²³¹⁰⁴-⁹]+$")
 _NO_UNIT_ALONE = {"C", "h", "A", "K", "l", "L", "in"}  # in a row of words one of these is a word
@@ -40,12 +55,13 @@ def name_and_unit(cell: str) -> tuple[str, str]:
 
 
 def plain_unit(cell: str) -> str:
-    """Return a unit without brackets, with one kind of µ; "1" for a pure number."""
+    """Return a unit without brackets, with one kind of µ, words as symbols: Sec is s; "1" for a pure number."""
     text = cell.strip()
     if match := _WRAPPED.fullmatch(text):
         text = match["square"] if match["square"] is not None else match["round"]
         text = text.strip() or "1"
     text = text.replace("μ", "µ")
+    text = _LETTERS.sub(lambda m: _CAPITALS.get(m[0]) or _WORDS.get(m[0].lower(), m[0]), text)
     return "1" if text and text.lower() in _PURE else text
 
 

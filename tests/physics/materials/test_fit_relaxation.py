@@ -83,3 +83,80 @@ def test_the_terms_go_into_a_material_and_a_study():
 def test_what_is_no_relaxation_is_refused(time, response, words):
     with pytest.raises(UsageError, match=words):
         fit_relaxation(time, response)
+
+
+def machine_record(rate, ramp, noise=0.0, start=2.0):
+    """Time on a clock whose rise begins at 2 s, and the response with a preload of 200 Pa."""
+    t = np.arange(start, 60.0, 1 / rate)
+    rising = np.clip((t - 2.0) / ramp, 1e-9, 1.0)
+    past = np.maximum(t - 2.0 - ramp, 0.0)
+    series = PronySeries(TERMS[1:])
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    ago = past[:, None] + ramp * rising[:, None] * (nodes + 1) / 2
+    y = 200 + np.where(t > 2.0, 9e3 * rising * (series.relaxation(ago) @ weights) / 2, 0.0)
+    return t, y + noise * 9e3 * np.random.default_rng(0).normal(size=len(t))
+
+
+@pytest.mark.parametrize(("rate", "ramp"), [(50, 0.5), (50, 2.0), (200, 0.1), (20, 1.0)])
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+def test_rise_and_preload_are_found_in_a_whole_record(rate, ramp, noise):
+    t, y = machine_record(rate, ramp, noise, start=0.0)
+    found = fit_relaxation(t, y)
+    assert found.ramp == pytest.approx(ramp, abs=0.1 * ramp)
+    assert found.instantaneous == pytest.approx(9e3, rel=0.03)
+    assert found.equilibrium == pytest.approx(6.3e3, rel=0.03)
+    begin = float(found.notes[0].partition("begins at ")[2].split()[0])
+    assert begin == pytest.approx(2.0 + ramp, abs=1 / rate + 0.02 * ramp)
+    assert any("a preload" in note for note in found.notes)
+
+
+def test_a_record_that_starts_with_the_rise_has_no_preload_that_is_known():
+    t, y = machine_record(100, 0.5, start=2.0)
+    found = fit_relaxation(t, y - 200)
+    assert found.instantaneous == pytest.approx(9e3, rel=0.01)
+    assert not any("a preload:" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    "time", [np.geomspace(1e-3, 100, 900), np.linspace(0.0, 100, 2000), np.arange(0.01, 60, 0.01)]
+)
+def test_times_that_count_from_the_rise_need_no_begin(time):
+    found = fit_relaxation(time, record(time, TERMS[1:]))
+    np.testing.assert_allclose(found.prony.terms, TERMS[1:], rtol=1e-3)
+    assert not any("begin" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("spacing", [np.linspace(0.01, 100, 3000), np.geomspace(0.01, 100, 300)])
+def test_a_clock_that_runs_before_the_record_is_asked_for(spacing):
+    with pytest.raises(UsageError, match="when the hold began is not known"):
+        fit_relaxation(5.0 + spacing, record(spacing))
+    found = fit_relaxation(5.0 + spacing, record(spacing, TERMS[1:]), begin=5.0)
+    np.testing.assert_allclose(found.prony.terms, TERMS[1:], rtol=1e-3)
+    late = fit_relaxation(
+        5.0 + spacing, record(5.0 + spacing, TERMS[1:]), begin=0.0
+    )  # it says: from the rise on
+    assert late.instantaneous == pytest.approx(9e3, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("rows", "noise", "sign"), [(1, 0.0, 1), (5, 0.002, -1), (20, 0.0, 1), (20, 0.002, 1)]
+)
+def test_a_hold_ends_where_the_specimen_is_let_go_or_stretched_again(rows, noise, sign):
+    t, y = machine_record(20, 0.5, noise, start=0.0)
+    share = np.clip((t - 50.0) * 20 / rows, 0.0, 1.0)
+    for end, said in ((y * (1 - share), "falls off"), (y * (1 + share), "rises again")):
+        found = fit_relaxation(t, sign * end)
+        assert found.equilibrium == pytest.approx(sign * 6.3e3, rel=0.01)
+        assert found.time[-1] == pytest.approx(47.5, abs=1.0)
+        note = next(note for note in found.notes if said in note)
+        assert f"{len(t) - np.searchsorted(t, 2.5 + found.time[-1] + 0.01)} rows" in note
+
+
+def test_a_record_of_two_steps_tells_that_the_second_has_the_first_beneath():
+    t, y = machine_record(20, 0.5, start=0.0)
+    second = y + np.interp(t - 30.0, t, y - 200, left=0.0)
+    first = fit_relaxation(t, second)
+    assert first.instantaneous == pytest.approx(9e3, rel=0.01)
+    later = fit_relaxation(t, second, begin=32.5)
+    assert later.ramp == pytest.approx(0.5, rel=0.1)
+    assert any("which goes on relaxing beneath it" in note for note in later.notes)

@@ -7,7 +7,8 @@
     s, mm, mm, mm, N, N, N                             then without this row
     0.00, 50.0, 50.0, 59.5, 0.001, -0.002, 0.013
 
-`palpate.tables` reads the file, so cells, numbers and heads may be written as there. Further columns are left out and
+`palpate.tables` reads the file, so cells, numbers and heads may be written as there, and time, depth and force may have
+the names that machines give them: Elapsed Time, Kraft. Further columns are left out and
 named, rows with an empty cell are left out and counted. Units may also stand in a sidecar, ``NAME.json`` beside
 ``NAME.csv``:
 
@@ -31,7 +32,7 @@ from palpate.dataset.measured.measured_columns import NAMES, Columns, Measuremen
 from palpate.errors import FileFormatError, UsageError
 from palpate.files import write_file
 from palpate.format import count
-from palpate.tables import Column, Table, read_table
+from palpate.tables import Column, Table, named_quantity, read_table
 
 __all__ = ["read_measurements", "write_measurements"]
 
@@ -102,6 +103,7 @@ def _columns(table: Table, side: Mapping[str, Any], side_path: Path) -> tuple[li
     beside = {name.strip().lower(): unit for name, unit in side.get("units", {}).items()}
     given = {n.strip().lower() for c in table.columns for n in (c.name, *c.aliases)}
     quantities = {table.column(name): name for name in NAMES if name in given}
+    quantities |= _by_other_names(table, quantities)
     chosen = [column for column in table.columns if column in quantities]
     number = (chosen or table.columns)[0].line
     line = f"{table.path}, line {number}" if number else str(table.path)
@@ -121,6 +123,19 @@ def _columns(table: Table, side: Mapping[str, Any], side_path: Path) -> tuple[li
         further = f" Columns of other names: {', '.join(others[:_SHOWN])}." if others else ""
         where = units_place if isinstance(error, UnitError) else line
         raise FileFormatError(f"{where}: {error.what}", why=error.why + further, fix=error.fix) from error
+
+
+def _by_other_names(table: Table, chosen: Mapping[Column, str]) -> dict[Column, str]:
+    """Return columns of time, and of depth and force, that have another name for it, where no other is meant."""
+    wanted = {"time": "t"}
+    if not {"x", "y", "z", "fx", "fy", "fz"} & set(chosen.values()):
+        wanted |= {"depth": "depth", "force": "f"}
+    found = {}
+    for kind, name in wanted.items():
+        columns = [c for c in table.columns if (q := named_quantity(c.name)) is not None and q.kind == kind]
+        if len(columns) == 1 and name not in chosen.values():
+            found[columns[0]] = name
+    return found
 
 
 def _further_columns(table: Table, chosen: list[Column]) -> list[str]:

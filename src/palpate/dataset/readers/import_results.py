@@ -21,6 +21,7 @@ from palpate.dataset.readers.load_energies import with_energies
 from palpate.dataset.readers.long_tables import by_case_and_place
 from palpate.dataset.readers.mapping import ImportMapping, read_mapping
 from palpate.dataset.readers.results import Column, Results, join_cases, join_columns
+from palpate.dataset.readers.slope_of_energy import contradiction
 from palpate.dataset.schema import Field, conjugate_unit
 from palpate.errors import UsageError
 from palpate.format import count
@@ -159,6 +160,8 @@ def _dataset(results: Results, mapping: ImportMapping, paths: Sequence[Path]) ->
     if not finite.all():
         failed = count(int((~finite).sum()), "case")
         notes.append(f"{failed} without finite answers: marked as not converged.")
+    extent = float(np.ptp(layout.rest, axis=0).max()) if len(layout.rest) else 0.0
+    about_energies += contradiction(fields, answers, inputs, ranges, extent)
     answers |= {
         "converged": finite,
         "iterations": np.zeros(len(inputs), dtype=int),

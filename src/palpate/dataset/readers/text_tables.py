@@ -11,7 +11,7 @@ from palpate.tables import read_table
 
 __all__ = ["SUFFIXES", "read_text_table"]
 
-SUFFIXES = (".csv", ".tsv", ".txt", ".asc", ".xlsx")
+SUFFIXES = (".csv", ".tsv", ".txt", ".asc", ".lvm", ".xlsx")
 
 
 def read_text_table(path: Path) -> Results:

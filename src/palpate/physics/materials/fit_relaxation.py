@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from palpate.errors import UsageError
 from palpate.format import number
 from palpate.output_files import picture_metadata
 from palpate.physics.materials.prony import PronySeries
+from palpate.physics.materials.relaxation_record import held_record
 from palpate.physics.materials.specimen_tests import columns_of_numbers
 
 __all__ = ["RelaxationFit", "fit_relaxation"]
@@ -52,7 +53,7 @@ class RelaxationFit:
     notes : tuple of str
         Sentences on what the record does not tell.
     time, response : (N,) arrays
-        The record.
+        The hold, from its begin, without the preload.
     ramp : float
         Time in s that the deformation took to rise.
     confidence : float
@@ -134,18 +135,32 @@ class RelaxationFit:
 
 
 def fit_relaxation(
-    time: ArrayLike, response: ArrayLike, *, ramp: float = 0.0, most: int = 6, confidence: float = 0.95
+    time: ArrayLike,
+    response: ArrayLike,
+    *,
+    begin: float | None = None,
+    ramp: float | None = None,
+    preload: float | None = None,
+    most: int = 6,
+    confidence: float = 0.95,
 ) -> RelaxationFit:
     """Fit a Prony series to a response at a held deformation.
 
     Parameters
     ----------
     time : (N,) array
-        Times in s, counted from the end of the rise, not negative.
+        Times in s. They count from the end of the rise, or, where the record has the rise, on any clock.
     response : (N,) array
         Stress or force, in any unit; its sign is that of the first value.
-    ramp : float
-        Time in s that the deformation took to rise at an even rate; 0 for a step too fast to matter.
+    begin : float, optional
+        Time in s, on the record's clock, at which the deformation had risen and the hold began; rows before it are not
+        fitted. By default found where the record has the rise, else 0.
+    ramp : float, optional
+        Time in s that the deformation took to rise at an even rate; 0 for a step too fast to matter. By default found
+        where the record has the rise, else 0.
+    preload : float, optional
+        Response before the rise, in the record's unit, which is subtracted. By default that of the rows before the
+        rise, or 0 where there are none.
     most : int
         Largest number of terms.
     confidence : float
@@ -154,25 +169,28 @@ def fit_relaxation(
     Raises
     ------
     UsageError
-        For records that are too short, not in order, or do not relax.
+        For records that are too short or do not relax, or that begin within the hold on a clock of the machine, where
+        only `begin` tells how long the hold has lasted.
     """
     t, y = columns_of_numbers("times", time, "responses", response)
-    checks.fits("The time of the rise", ramp, "s", least=0)
+    checks.fits("The time of the rise", 0.0 if ramp is None else ramp, "s", least=0)
     order = np.argsort(t, kind="stable")
-    t, y = t[order], y[order]
+    record = held_record(t[order], y[order], begin, ramp, preload)
+    t, y, ramp = record.time, record.response, record.ramp
     scale = float(y[: max(1, len(y) // 50)].mean())
-    if t[0] < 0 or not t[-1] > 0 or scale == 0 or most < 1:
+    if len(t) < 4 or not t[-1] > 0 or scale == 0 or most < 1:
         raise UsageError(
-            f"This record from {t[0]:g} to {t[-1]:g} s can't be fitted with up to {most} terms.",
-            why="Times are counted from the end of the rise, and the response there is not 0.",
-            fix="Cut off what comes before, and subtract its time.",
+            f"This record of {len(t)} rows, {t[-1]:g} s from the begin of the hold on, can't be fitted with up to "
+            f"{most} terms.",
+            why="The response at the begin of the hold is not 0, and one term needs four rows.",
+            fix="Check when the hold begins: begin= (--begin).",
         )
     y = y / scale
     if y[-max(1, len(y) // 20) :].mean() >= y[0] - 1e-3 * np.ptp(y):
         raise UsageError(
             "The response does not relax.",
             why=f"It goes from {scale:g} to {scale * y[-1]:g} while the deformation is held.",
-            fix="Check the columns, and that the record begins at the end of the rise.",
+            fix="Check the columns, and give the time at which the rise ended: begin= (--begin).",
         )
     branches = _from_grid(t, y, ramp)
     tried: list[tuple[float, np.ndarray, float]] = []
@@ -190,7 +208,8 @@ def fit_relaxation(
         )
     least = min(score for score, _, _ in tried)
     _, kept, rest = next(entry for entry in reversed(tried) if entry[0] <= least + STRONG)
-    return _result(t, y, scale, ramp, kept, rest, confidence)
+    found = _result(t, y, scale, ramp, kept, rest, confidence)
+    return replace(found, notes=(*record.notes, *found.notes))
 
 
 def _left_of_ramp(ramp: float, tau: Any) -> Any:

@@ -15,6 +15,7 @@ from palpate.dataset.schema import FORMAT, FORMAT_VERSION, TIMINGS
 from palpate.dataset.stored_sizes import require_stored_sizes
 from palpate.errors import FileFormatError, UsageError
 from palpate.files import writing_folder
+from palpate.input_files import read_input
 
 if TYPE_CHECKING:
     import xarray
@@ -98,15 +99,15 @@ def _attributes(path: Path) -> dict[str, Any]:
             fix="Check the path, or run a sweep that writes it.",
         )
     metadata = path / "zarr.json"
-    try:
-        attrs = json.loads(metadata.read_text(encoding="utf-8"))["attributes"]
-    except (FileNotFoundError, NotADirectoryError) as error:
+    if not metadata.exists():
         raise FileFormatError(
             f"{path} is no dataset of palpate.",
             why="It isn't a folder with a file zarr.json.",
             fix="Open a store that palpate wrote, a folder NAME.zarr.",
-        ) from error
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        )
+    try:
+        attrs = json.loads(read_input(metadata))["attributes"]
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise _corrupt(path, f"its zarr.json can't be read ({type(error).__name__}).") from error
     if not isinstance(attrs, dict):
         raise _corrupt(path, "the attributes in zarr.json are no table.")

@@ -34,6 +34,7 @@ import numpy as np
 
 from palpate.errors import FileFormatError, ResourceError, UsageError
 from palpate.files import system_errors
+from palpate.input_files import read_input
 from palpate.runtime.recording import FLAGS, TICK
 
 __all__ = ["COLUMNS", "FORMAT", "VERSION", "Trace", "TraceWriter", "read_trace"]
@@ -238,12 +239,7 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
     import psutil
 
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise FileFormatError(
-            f"{path} can't be read.", why=str(error.strerror or error), fix="Check the name."
-        ) from error
+    data = read_input(path)
     header: dict[str, Any] = {}
     state, end = None, None
     chunks: list[np.ndarray] = []

@@ -6,7 +6,6 @@ import difflib
 import json
 import os
 import re
-import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, get_args
@@ -15,8 +14,9 @@ import tomlkit
 from pydantic import BaseModel, ValidationError
 from tomlkit.items import AoT
 
-from palpate.errors import StudyError
+from palpate.errors import FileFormatError, StudyError
 from palpate.file_kinds import file_kind, way_for
+from palpate.input_files import read_toml
 from palpate.study.body_records import BODIES
 from palpate.study.interaction_records import INTERACTIONS
 from palpate.study.quantities import Unit
@@ -56,24 +56,18 @@ def read_study(path: str | os.PathLike[str]) -> Study:
             f"{path} is {kind}, not a study file.",
             fix=f"{way_for(path)} A study file is a text, NAME.toml: write one with `palpate init`.",
         )
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
+    if not path.exists():
         fix = {
             "a dataset of solves": "Write one with `palpate sweep STUDY.toml`, or give the path of another.",
             "a model file": "Name a study file, NAME.toml; `palpate learn` writes the model file.",
         }.get(kind, "Write one with `palpate init`.")
-        raise StudyError(f"{path} does not exist.", fix=fix) from error
-    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"{path} does not exist.", fix=fix)
+    try:
+        content = read_toml(path)
+    except FileFormatError as error:
         raise StudyError(
-            f"{path} can't be read as a study.",
-            why=f"{error}.",
-            fix="A study is a text file: write one with `palpate init`.",
+            error.what, why=error.why, fix=f"{error.fix} `palpate init` writes a study."
         ) from error
-    except tomllib.TOMLDecodeError as error:
-        twice = "overwrite" in str(error)
-        fix = "A key or a table stands there twice: keep one." if twice else "Correct that line."
-        raise StudyError(f"{path} is not valid TOML.", why=f"{error}.", fix=fix) from error
     try:
         return Study.model_validate(_beside(path.parent, _from_first_version(content)))
     except ValidationError as error:

@@ -24,6 +24,7 @@ from palpate.dataset.readers.results import Column, Results, join_cases, join_co
 from palpate.dataset.schema import Field, conjugate_unit
 from palpate.errors import UsageError
 from palpate.format import count
+from palpate.input_files import read_input
 from palpate.units import Range, to_si
 
 __all__ = ["Imported", "import_results", "read_files"]
@@ -290,7 +291,7 @@ def _about_coordinates(results: Results, nodal: Sequence[str]) -> list[str]:
 def _provenance(
     results: Results, mapping: ImportMapping, paths: Sequence[Path], notes: Sequence[str]
 ) -> dict[str, Any]:
-    files = [{"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()} for path in paths]
+    files = [{"name": path.name, "sha256": hashlib.sha256(read_input(path)).hexdigest()} for path in paths]
     return {
         "words": mapping.name,
         "problem": {

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.input_files import read_input
 from palpate.physics.shapes.mesh_groups import SOLIDS, Group, MeshSource
 from palpate.physics.shapes.naming import plain_name
 
@@ -88,11 +89,11 @@ def _refuse(path: str, line: int, what: str, why: str, fix: str) -> UsageError:
 def _blocks(path: str, name: Path, depth: int = 0) -> Iterator[_Block]:
     """Yield the keywords of a file and of those that it includes."""
     try:
-        lines = name.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
+        lines = read_input(name).decode("utf-8", "replace").splitlines()
+    except FileFormatError as error:
         raise UsageError(
             f"{path} includes {name}, which can't be read.",
-            why=f"{error.strerror}.",
+            why=error.why,
             fix="Put the file beside it, or export the whole mesh into one file.",
         ) from error
     if depth > DEEPEST:

@@ -23,6 +23,7 @@ import numpy as np
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
 from palpate.file_kinds import way_for
+from palpate.input_files import read_input
 from palpate.physics.advice import advise
 from palpate.physics.shapes.naming import require_known, require_name
 from palpate.physics.shapes.triangle_list import read_triangles
@@ -75,7 +76,7 @@ def named_files(path: str) -> tuple[Path, ...]:
         return tuple(file.with_suffix(other) for other in (".node", ".ele", ".face") if other != ending)
     if ending not in _NAMED:
         return ()
-    names = dict.fromkeys(_NAMED[ending].findall(file.read_bytes()))
+    names = dict.fromkeys(_NAMED[ending].findall(read_input(file)))
     return tuple(file.parent / name.decode("utf-8", "replace").strip(' "') for name in names)
 
 
@@ -89,14 +90,7 @@ def digest_of(path: str) -> str:
     FileFormatError
         If it is empty.
     """
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise UsageError(
-            f"The file {path} can't be read.",
-            why=f"{error.strerror}.",
-            fix="Check the path; a relative one starts from the directory of the running program.",
-        ) from error
+    content = read_input(path)
     if not content.strip():
         raise FileFormatError(
             f"The file {path} is empty.", why="It has no content.", fix="Export the shape again."
@@ -104,7 +98,7 @@ def digest_of(path: str) -> str:
     digest = hashlib.sha256(content)
     for other in named_files(path):
         if other.is_file():
-            digest.update(other.read_bytes())
+            digest.update(read_input(other))
     return digest.hexdigest()
 
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from pathlib import Path
 
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.input_files import open_input, read_input
 from palpate.physics.shapes.mesh_groups import FACES, SOLIDS, Group, MeshSource
 from palpate.physics.shapes.naming import plain_name
 
@@ -38,7 +38,7 @@ NAMES = re.compile(rb'^\s*(\d+)\s+(-?\d+)\s+"(.*)"', re.MULTILINE)
 
 def is_gmsh_4(path: str) -> bool:
     """Tell whether a file is one of Gmsh in format 4.1."""
-    with Path(path).open("rb") as file:
+    with open_input(path) as file:
         return re.match(rb"\s*\$MeshFormat\s+4\.1\b", file.read(200)) is not None
 
 
@@ -92,7 +92,7 @@ def read_gmsh(path: str) -> MeshSource:
     UsageError
         If it is one part of a partitioned mesh.
     """
-    content = Path(path).read_bytes()
+    content = read_input(path)
     if b"$PartitionedEntities" in content:
         raise UsageError(
             f"The mesh in {path} is partitioned.",

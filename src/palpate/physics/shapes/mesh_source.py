@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.input_files import read_input
 from palpate.physics.shapes.abaqus_file import read_abaqus
 from palpate.physics.shapes.body_file import named_files, read_with_meshio
 from palpate.physics.shapes.gmsh_file import is_gmsh_4, read_gmsh
@@ -119,7 +120,7 @@ def _read_other(path: str) -> Any:
 
 def _read_vtk(path: str) -> Any:
     """Read a VTK file by meshio; by PyVista where meshio doesn't know its form, or passes over kinds of cells."""
-    content = Path(path).read_bytes()
+    content = read_input(path)
     try:
         mesh = read_with_meshio(path)
     except FileFormatError:
@@ -345,7 +346,7 @@ def _skip_messages(mesh: Any) -> list[str]:
 
 def _require_all_cards(path: str, mesh: Any) -> None:
     """Refuse a Nastran file of which meshio has passed over cells, as it does with those of sixteen columns."""
-    cards = Counter(word.decode().upper() for word in SOLID_CARD.findall(Path(path).read_bytes()))
+    cards = Counter(word.decode().upper() for word in SOLID_CARD.findall(read_input(path)))
     there = sum(cards.values())
     read = sum(len(block.data) for block in mesh.cells if _kind(block.type) in SOLIDS)
     if read != there:
@@ -370,7 +371,7 @@ def _require_basic_system(path: str, mesh: Any) -> None:
 
 def _name_properties(path: str, mesh: Any) -> None:
     """Add the names that preprocessors write into comments of a Nastran file to the numbers of properties."""
-    for match in PROPERTY.finditer(Path(path).read_bytes()):
+    for match in PROPERTY.finditer(read_input(path)):
         number, name = (match[1], match[2]) if match[1] else (match[3], match[4])
         text = name.decode("utf-8", "replace")
         # a field holds one name; the same number may be a solid's or a shell's

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.files import TemporaryFolder
 from palpate.format import millimetres
+from palpate.input_files import read_input
 from palpate.physics.apart import read_apart
 from palpate.physics.shapes.body_file import UNITS, SurfacePatch, apply_patches, segments, tell_repairs
 from palpate.physics.shapes.mesh import BodyMesh, body_mesh
@@ -67,7 +67,7 @@ def read_stl(path: str, unit: str, simplify: float | None = None) -> tuple[Trime
     UsageError
         If the surface bounds no body, or its size tells of mistaken units.
     """
-    surface = parse_stl(path, Path(path).read_bytes())
+    surface = parse_stl(path, read_input(path))
     surface = replace(surface, points=surface.points * UNITS[unit])
     require_size(path, surface.length, unit)
     surface = repair_surface(surface)

@@ -58,6 +58,7 @@ DAMAGE = (
 )
 """Kinds of errors that libraries raise on broken bytes."""
 _TOML_LARGEST = 2_000_000  # bytes: a study has some thousands
+_DEEP_KEY = re.compile(r"""^[ \t\[]*[\w"'-]+([ \t]*\.[ \t]*[\w"'-]+){64}""", re.MULTILINE)
 _GROWTH = 64_000_000  # bytes more than its stated size that a file may have: those of /proc state none
 _KINDS = (
     (stat.S_ISDIR, "a folder"),
@@ -151,7 +152,10 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
         If it can't be read, or is no TOML.
     """
     try:
-        return dict(plain_texts(tomllib.loads(read_input(path, largest=_TOML_LARGEST).decode())))
+        text = read_input(path, largest=_TOML_LARGEST).decode()
+        if _DEEP_KEY.search(text):  # which takes the parser minutes
+            raise RecursionError  # noqa: TRY301 - said as of nested lists
+        return dict(plain_texts(tomllib.loads(text)))
     except UnicodeDecodeError as error:
         raise FileFormatError(
             f"{path} can't be read as TOML.", why=f"{error}.", fix="Save it as a text in UTF-8."

@@ -17,7 +17,7 @@ import numpy as np
 from palpate.dataset.schema import FORMAT, FORMAT_VERSION, TIMINGS
 from palpate.dataset.stored_chunks import ChunkFault, chunk_faults, missing_chunks, unreadable_chunks
 from palpate.errors import DataWarning, FileFormatError, UsageError
-from palpate.files import writing_folder
+from palpate.files import restore_folder, writing_folder
 from palpate.input_files import DAMAGE, read_input
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def _array_checksum(name: str, array: xarray.DataArray) -> str:
 
 def write(data: xarray.Dataset, path: Path, *, overwrite: bool) -> Path:
     """Write a dataset's arrays to `path`; the store appears whole or not at all."""
+    restore_folder(path)
     if path.exists() and not overwrite:
         if _holds(path, data):
             return path
@@ -80,6 +81,7 @@ def write(data: xarray.Dataset, path: Path, *, overwrite: bool) -> Path:
 
 def read(path: Path) -> xarray.Dataset:
     """Read and check the arrays in the store at `path`."""
+    restore_folder(path)
     attrs = _attributes(path)
     if attrs.get("format") != FORMAT:
         raise FileFormatError(

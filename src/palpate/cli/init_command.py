@@ -9,6 +9,7 @@ import typer
 from palpate.errors import UsageError
 from palpate.file_kinds import file_kind, way_for
 from palpate.files import write_file
+from palpate.input_files import plain_text
 
 __all__ = ["init_study"]
 
@@ -70,7 +71,7 @@ def init_study(
         return
     _require_free(target, force=force)
     write_file(target, text)
-    typer.echo(f"{target}: a study called {record.name}. Next: palpate sweep {target}")
+    typer.echo(plain_text(f"{target}: a study called {record.name}. Next: palpate sweep {target}"))
 
 
 def _write_sample(path: Path, *, force: bool) -> None:
@@ -79,7 +80,7 @@ def _write_sample(path: Path, *, force: bool) -> None:
     path = Path("kidney.stl") if path == Path("study.toml") else path
     _require_free(path, force=force)
     write_sample_part(path)
-    typer.echo(f"{path}: a kidney-like organ, 5,120 triangles, in mm. Next: palpate init {path}")
+    typer.echo(plain_text(f"{path}: a kidney-like organ, 5,120 triangles, in mm. Next: palpate init {path}"))
 
 
 def _require_free(path: Path, *, force: bool) -> None:

@@ -18,7 +18,7 @@ from palpate.dataset.schema import FORMAT, FORMAT_VERSION, TIMINGS
 from palpate.dataset.stored_chunks import ChunkFault, chunk_faults, missing_chunks, unreadable_chunks
 from palpate.errors import DataWarning, FileFormatError, UsageError
 from palpate.files import restore_folder, writing_folder
-from palpate.input_files import DAMAGE, read_input
+from palpate.input_files import DAMAGE, plain_text, read_input
 
 if TYPE_CHECKING:
     import xarray
@@ -96,7 +96,7 @@ def read(path: Path) -> xarray.Dataset:
             why=f"This palpate reads versions up to {FORMAT_VERSION}.",
             fix="Open it with a newer palpate.",
         )
-    return _load(path)
+    return _with_plain_texts(_load(path))
 
 
 def _encoding(data: xarray.Dataset) -> dict[str, dict[str, Any]]:
@@ -111,6 +111,21 @@ def _encoding(data: xarray.Dataset) -> dict[str, dict[str, Any]]:
             rows = min(max(_CHUNK_ROWS, -(-count // _CHUNKS)), CHUNK_BYTES * count // max(variable.nbytes, 1))
             encoding[str(name)]["chunks"] = (min(max(1, rows), count), *variable.shape[1:])
     return encoding
+
+
+def _with_plain_texts(data: xarray.Dataset) -> xarray.Dataset:
+    """Return the arrays with texts that show as they stand, see `plain_text`; changed only where one does not."""
+    texts = {str(name): array for name, array in data.variables.items() if array.dtype.kind in "TOU"}
+    plain = {
+        name: np.array([plain_text(str(text)) for text in array.values.ravel()], dtype=array.dtype)
+        for name, array in texts.items()
+    }
+    changed = {
+        name: (texts[name].dims, values.reshape(texts[name].shape), texts[name].attrs)
+        for name, values in plain.items()
+        if not np.array_equal(values, texts[name].values.ravel())
+    }
+    return data.assign(changed) if changed else data
 
 
 def _attributes(path: Path) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import pytest
 
 from palpate import files
 from palpate.cli.app import main
-from palpate.dataset import Layout, assemble
+from palpate.dataset import Dataset, Layout, assemble
 from palpate.errors import ResourceError, UsageError
 from palpate.files import TemporaryFolder, system_errors, write_file, writing, writing_folder
 from palpate.network.container import Container, write_container
@@ -142,6 +142,31 @@ def test_what_a_killed_process_was_writing_goes_with_the_next_write(tmp_path):
     with writing_folder(tmp_path / "b") as part:
         part.mkdir()
     assert names(tmp_path) == [young.name, "a.txt", "b"]
+
+
+KILLED_IN_BETWEEN = """
+import os, signal, sys
+from palpate.dataset import Dataset
+data = Dataset.open(sys.argv[1])
+def replace(source, target, replaced=os.replace):
+    if str(target) == sys.argv[1]:
+        os.kill(os.getpid(), signal.SIGKILL)
+    replaced(source, target)
+os.replace = replace
+data.take([0]).save(sys.argv[1], overwrite=True)
+"""
+
+
+def test_a_dataset_that_a_killed_process_was_replacing_is_taken_back(tmp_path):
+    """It is killed after the old one has been moved aside, before the new one takes its place."""
+    old = dataset(4)
+    old.save(tmp_path / "a.zarr")
+    done = subprocess.run([sys.executable, "-c", KILLED_IN_BETWEEN, tmp_path / "a.zarr"], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert not (tmp_path / "a.zarr").exists()
+    assert Dataset.open(tmp_path / "a.zarr").hash == old.hash
+    assert not list(tmp_path.glob(".a.zarr.*.old"))
+    assert old.save(tmp_path / "a.zarr") == tmp_path / "a.zarr"
 
 
 HOLDER = """

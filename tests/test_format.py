@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,6 +19,7 @@ from palpate.format import (
     power_of_ten,
     pressure,
     scientific,
+    script_json,
     share,
     summary_figure,
 )
@@ -97,3 +100,12 @@ def test_figures_of_a_record_are_written_as_the_table_of_limits_writes_them() ->
     assert summary_figure("force error, 95th percentile", 0.0123) == "1.2 %"
     assert summary_figure("unseen solves", 101) == 101
     assert summary_figure("limits kept", True) is True
+
+
+@given(
+    st.recursive(st.none() | st.floats(allow_nan=False) | st.text(), lambda v: st.dictionaries(st.text(), v))
+)
+def test_json_in_a_script_is_the_same_value_without_marks(value):
+    text = script_json(json.dumps(value, ensure_ascii=False))
+    assert json.loads(text) == value
+    assert not set("<>&\u2028\u2029") & set(text)

@@ -24,6 +24,7 @@ from typing import ClassVar
 
 __all__ = [
     "AccuracyError",
+    "DataWarning",
     "DeviceError",
     "DeviceLostError",
     "DeviceStopError",
@@ -117,6 +118,10 @@ class ResourceError(PalpateError):
     """The machine lacks what the work needs: room on a disk, the right to write, memory, a scheduler."""
 
     exit_code = 3
+
+
+class DataWarning(UserWarning):
+    """Data were read of which a part is lost: it says which, and what to do."""
 
 
 class FitWarning(UserWarning):

@@ -5,6 +5,7 @@
     writing          yields a path beside the file; what is written there takes its place at once, or never
     write_file       the same for bytes or a text
     writing_folder   the same for a folder, such as a Zarr store
+    restore_folder   takes back a folder that a killed process had moved aside
     TemporaryFolder  a folder for scratch files; those of processes that were killed are removed by the next one
     system_errors    turns errors of the operating system into palpate's own
 """
@@ -30,6 +31,7 @@ __all__ = [
     "TemporaryFolder",
     "explain_system_error",
     "require_regular",
+    "restore_folder",
     "system_errors",
     "write_file",
     "writing",
@@ -42,6 +44,7 @@ _MARK, _ABANDONED = (
     "?" * 8,
     3600.0,
 )  # pattern of the marks of unfinished files; s after which nobody writes them
+_HALF_DONE = 0.2  # s between two renames, at most
 _WRONG_PATH = {
     errno.ENOENT,
     errno.EEXIST,
@@ -130,6 +133,7 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     mark = uuid.uuid4().hex[:8]
     part, old = (target.with_name(f".{target.name}.{mark}.{end}") for end in ("part", "old"))
     _remove_abandoned_parts(target.parent, f".{glob.escape(target.name)}.{_MARK}.part")
+    restore_folder(target)
     with system_errors(f"Could not write {target}."):
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -149,6 +153,28 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
                 os.replace(old, target)
             for leftover in (part, old):
                 shutil.rmtree(leftover, ignore_errors=True)
+
+
+def restore_folder(path: str | os.PathLike[str]) -> None:
+    """Take back the folder that a killed process had moved aside to replace it, where nothing stands in its place.
+
+    Where the new one stands there, the old one is removed.
+    """
+    target = Path(path)
+    with contextlib.suppress(OSError):
+        moved = sorted(
+            target.parent.glob(f".{glob.escape(target.name)}.{_MARK}.old"),
+            key=lambda old: old.stat().st_mtime,
+        )
+        for old in reversed(moved):  # the latest first
+            if not target.exists() and time.time() - old.stat().st_ctime < _HALF_DONE:
+                time.sleep(_HALF_DONE)  # its process may be about to bring the new one
+            if not target.exists():
+                os.rename(old, target)
+            elif (
+                time.time() - old.stat().st_ctime > _ABANDONED
+            ):  # which a rename sets: a younger one may be in use
+                shutil.rmtree(old, ignore_errors=True)
 
 
 def _remove_abandoned_parts(folder: Path, pattern: str) -> None:

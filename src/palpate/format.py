@@ -22,6 +22,7 @@ __all__ = [
     "power_of_ten",
     "pressure",
     "scientific",
+    "script_json",
     "share",
     "span",
     "summary_figure",
@@ -43,6 +44,11 @@ def plain(value: float, digits: int = 2) -> str:
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
     text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def script_json(text: str) -> str:
+    """Write a JSON text so that it may stand in a script of an HTML page: the same value, and no mark of HTML's."""
+    return re.sub("[<>&\u2028\u2029]", lambda mark: f"\\u{ord(mark[0]):04x}", text)
 
 
 def scientific(value: float, digits: int = 2) -> str:

@@ -10,6 +10,7 @@ The child's side is `palpate.supervised_child`.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import pickle
 import queue
@@ -24,17 +25,32 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
-from palpate.errors import PalpateError, SolverError
+from palpate.errors import FileFormatError, PalpateError, SolverError
 from palpate.files import TemporaryFolder
+from palpate.input_files import require_input
 from palpate.processes import helper_environment, is_supervised, kill_group
 
-__all__ = ["Child", "ChildEnded", "RemoteTraceback", "read_frame", "run_in_child", "write_frame"]
+__all__ = [
+    "Child",
+    "ChildEnded",
+    "RemoteTraceback",
+    "read_frame",
+    "read_in_child",
+    "run_in_child",
+    "write_frame",
+]
 
 START = 60.0  # s in which a child has to be ready
 GRACE = 5.0  # s after a call's limit in which the child ends by itself, with the traceback of the moment
+_LOOK = 0.05  # s between looks at the memory of a child
 _IDLE = 10.0  # s without a call after which a shared child is ended
 READER = "read_requests"  # the function of a child's second thread, whose place is of no interest
 _OWN_FRAMES = ("supervised_child.py", "<frozen runpy>")  # below those of the work
+_READ_SECONDS, _READ_RATE = 40.0, 5e5  # s that reading any file may take; bytes for each s more
+_READ_MEMORY, _READ_GROWTH = (
+    1.5e9,
+    50.0,
+)  # bytes that reading may take; more for each byte of a file, packed ones too
 _HEAD = struct.Struct(">Q")
 _DETAILS = 4000  # characters of the child's last words that are kept
 
@@ -94,7 +110,9 @@ class Child:
         with self._lock:
             self._started()
 
-    def call(self, function: Callable[..., Result], *arguments: Any, limit: float) -> Result:
+    def call(
+        self, function: Callable[..., Result], *arguments: Any, limit: float, memory: float = math.inf
+    ) -> Result:
         """Call a function of a module, with arguments that can be pickled, in the child.
 
         Parameters
@@ -105,11 +123,13 @@ class Child:
             Of the function; relative paths start from this process's working directory.
         limit : float
             Time in s after which the child is ended.
+        memory : float
+            Number of bytes of memory in use above which the child is ended.
 
         Raises
         ------
         ChildEnded
-            If the call ends the process, or takes longer.
+            If the call ends the process, takes longer, or takes more memory.
         BaseException
             What the function raised; its cause is a `RemoteTraceback`.
         """
@@ -120,7 +140,7 @@ class Child:
         with self._lock:
             running = self._started()
             try:
-                good, answer = running.ask(request, limit)
+                good, answer = running.ask(request, limit, memory)
             except BaseException:  # an interruption too: nobody would take the answer any more
                 self.close()
                 raise
@@ -176,31 +196,45 @@ class _Running:
         threading.Thread(target=_receive, args=(self.process.stdout, self._answers), daemon=True).start()
         self.end = weakref.finalize(self, _end, self.process, self._log, self.folder)
 
-    def ask(self, request: bytes, limit: float) -> tuple[bool, Any]:
+    def ask(self, request: bytes, limit: float, memory: float) -> tuple[bool, Any]:
         """Return True and the result of a call, or False and its exception with the traceback."""
         if not self._ready:  # its imports are no part of the call
             self._ready = True
-            self._answer(START)
+            self._answer(START, math.inf)
         self._log.truncate(0)
         with contextlib.suppress(OSError):  # it is gone, and its input with it: the answers end
             write_frame(self._stdin, request)
-        good, result = pickle.loads(self._answer(limit))
+        good, result = pickle.loads(self._answer(limit, memory))
         return good, result
 
-    def _answer(self, limit: float) -> bytes:
-        began = time.monotonic()
-        try:
-            answer = self._answers.get(timeout=limit + GRACE)
-        except queue.Empty:
-            raise self._ended(overdue=True, limit=limit) from None
+    def _answer(self, limit: float, memory: float) -> bytes:
+        began, late = time.monotonic(), f"it took longer than {limit:g} s"
+        while True:
+            rest = began + limit + GRACE - time.monotonic()
+            try:
+                answer = self._answers.get(timeout=max(rest if memory == math.inf else min(rest, _LOOK), 0.0))
+                break
+            except queue.Empty:
+                if rest <= 0:
+                    raise self._ended(late, overdue=True) from None
+                if self._memory() > memory:
+                    raise self._ended(f"it took more than {memory / 1e9:.2g} GB of memory") from None
         if answer is None:
-            self.process.wait()
-            raise self._ended(overdue=time.monotonic() - began >= limit, limit=limit)
+            code = self.process.wait()
+            overdue = time.monotonic() - began >= limit
+            raise self._ended(late if overdue else _describe_exit(code), overdue=overdue)
         return answer
 
-    def _ended(self, *, overdue: bool, limit: float) -> ChildEnded:
-        code = self.process.poll()
-        reason = f"it took longer than {limit:g} s" if overdue else _describe_exit(code or 0)
+    def _memory(self) -> float:
+        """Return the number of bytes of memory that the process has in use."""
+        import psutil
+
+        try:
+            return float(psutil.Process(self.process.pid).memory_info().rss)
+        except psutil.Error:  # it has just ended
+            return 0.0
+
+    def _ended(self, reason: str, *, overdue: bool = False) -> ChildEnded:
         details = self._last_words()
         error = ChildEnded(f"A process that worked for this one was ended: {reason}.", why=details)
         error.overdue, error.reason, error.details = overdue, reason, details
@@ -262,14 +296,48 @@ def _describe_exit(code: int) -> str:
     return f"its process was ended by {name}{memory}"
 
 
-def run_in_child(function: Callable[..., Result], *arguments: Any, limit: float) -> Result:
+def run_in_child(
+    function: Callable[..., Result], *arguments: Any, limit: float, memory: float = math.inf
+) -> Result:
     """Call a function in a child process, or here where this process is a child already.
 
     The parameters and exceptions are those of `Child.call`.
     """
     if is_supervised():
         return function(*arguments)
-    return _shared.call(function, *arguments, limit=limit)
+    return _shared.call(function, *arguments, limit=limit, memory=memory)
+
+
+def read_in_child(function: Callable[..., Result], path: Path, *arguments: Any) -> Result:
+    """Return what a reader in C or C++ makes of a file, read in a child process: a damaged file may crash it.
+
+    Time and memory that it may take grow with the file's size.
+
+    Parameters
+    ----------
+    function : callable
+        Reader, defined at the top of a module; takes the path and the arguments.
+    path : Path
+        The file.
+    *arguments
+        Of the reader.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is none, or if the reader crashes, does not end or takes far more memory than the file is large.
+    """
+    require_input(path)
+    size = path.stat().st_size
+    limit, memory = _READ_SECONDS + size / _READ_RATE, _READ_MEMORY + _READ_GROWTH * size
+    try:
+        return run_in_child(function, path, *arguments, limit=limit, memory=memory)
+    except ChildEnded as error:
+        raise FileFormatError(
+            f"{path} can't be read.",
+            why=f"Its reader was ended: {error.reason}. The file is damaged, or not what it says it is.",
+            fix="Open it in the program that made it and export it again.",
+        ) from error
 
 
 class _SharedChild:
@@ -278,10 +346,10 @@ class _SharedChild:
     def __init__(self) -> None:
         self._child, self._timer = Child(), threading.Timer(0.0, _nothing)
 
-    def call(self, function: Callable[..., Result], *arguments: Any, limit: float) -> Result:
+    def call(self, function: Callable[..., Result], *arguments: Any, limit: float, memory: float) -> Result:
         self._timer.cancel()
         try:
-            return self._child.call(function, *arguments, limit=limit)
+            return self._child.call(function, *arguments, limit=limit, memory=memory)
         finally:
             self._timer = threading.Timer(_IDLE, self._child.close_if_idle)
             self._timer.daemon = True

@@ -294,7 +294,7 @@ def test_a_dataset_without_strains_is_read_and_joined(stored):
         np.testing.assert_array_equal(np.flatnonzero(np.isfinite(found)), np.arange(40)[known])
 
 
-@pytest.mark.parametrize("version", [3, 99, "1", None])
+@pytest.mark.parametrize("version", [4, 99, "1", None])
 def test_a_later_format_asks_for_a_newer_palpate(stored, version):
     edit_metadata(stored, lambda metadata: metadata["attributes"].update(format_version=version))
     with pytest.raises(FileFormatError, match="format version") as caught:

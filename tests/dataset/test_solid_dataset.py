@@ -150,7 +150,7 @@ def test_rows_of_both_versions_are_joined(version_1):
     names = [field.name for field in with_bookkeeping(schema)]
     plan = Layout(old.rest, old["of_interest"], old.load_nodes, old.load_directions)
     new = assemble(old.ranges, plan, old.X, {n: old[n] for n in names}, old.provenance)
-    assert new.data.attrs["format_version"] == 2
+    assert new.data.attrs["format_version"] > 1
     ends = {"sample", "input_low", "input_high"}  # given as integers here, as floats there
     assert new.fingerprint(exclude=ends) == old.fingerprint(exclude=ends)
     assert len(Dataset.concat([old, new])) == len(Dataset.concat([new, old])) == 8

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ class Spring:
 
     raises, dies, aborts, hangs, fails, lies: inputs at which the solver raises, ends its process with code 3, by a
     signal, never ends, does not converge, or claims so without a number.
+    quits: for each kind of exception that is no `Exception`, the input at which it raises it.
     log: a folder that gets one file per solve.
     """
 
@@ -30,6 +32,7 @@ class Spring:
     hangs: tuple[float, ...] = ()
     fails: tuple[float, ...] = ()
     lies: tuple[float, ...] = ()
+    quits: dict[str, float] = field(default_factory=dict)
     log: str = ""
     seconds: float = 0.0
     ranges: tuple[Range, ...] = (Range("P", 0.0, 10.0, "N"),)
@@ -64,6 +67,11 @@ class SpringSolver:
             os._exit(3)
         if force in self.problem.aborts:
             os.abort()
+        if force == self.problem.quits.get("exit"):
+            sys.exit(3)
+        for kind in (KeyboardInterrupt, GeneratorExit, Unwritable):
+            if force == self.problem.quits.get(kind.__name__):
+                raise kind
         if force in self.problem.hangs:
             never_end()
         stop = Stop.UNSTABLE if force in self.problem.fails else Stop.CONVERGED
@@ -77,6 +85,16 @@ class SpringSolver:
             strain_energy=u * u,
             potential_energy=np.nan if force in self.problem.lies else -u * u,
         )
+
+
+class Unwritable(BaseException):
+    """An exception that is no `Exception` and can't be told as text."""
+
+    def __str__(self):
+        raise ZeroDivisionError
+
+    def __reduce__(self):
+        raise ZeroDivisionError
 
 
 def never_end():

@@ -4,6 +4,7 @@ import contextlib
 import gc
 import os
 import signal
+import sys
 import threading
 
 import numpy as np
@@ -48,6 +49,31 @@ def test_a_case_that_never_ends_costs_its_limit_once(cluster, tmp_path):
     assert data.message[4].startswith("it took longer than 2 s\n\n")
     assert "in never_end" in data.message[4]
     assert len(list(tmp_path.glob("4.000000-*"))) == 1
+
+
+def test_what_is_no_exception_costs_its_row_alone(cluster):
+    """sys.exit and its like end neither the worker nor the neighbours, which solve on in the same chain."""
+    quits = {"exit": 1.0, "KeyboardInterrupt": 3.0, "GeneratorExit": 4.0, "Unwritable": 6.0}
+    before = cluster.process_ids
+    data = sweep(Spring(quits=quits), points=np.arange(8.0), cluster=cluster)
+    np.testing.assert_array_equal(np.flatnonzero(~data.converged), [1, 3, 4, 6])
+    np.testing.assert_array_equal(data.ok.displacement[:, 0, 1], -np.array([0.0, 2.0, 5.0, 7.0]) / 2)
+    assert cluster.process_ids == before
+    reasons = [str(data.message[row]).partition("\n\n")[0] for row in (1, 3, 4, 6)]
+    assert reasons[:3] == ["called sys.exit(3)", "raised KeyboardInterrupt", "raised GeneratorExit"]
+    assert reasons[3].startswith("raised sweep_problems.Unwritable")
+    assert "in solve" in data.message[1]
+
+
+class Quitting(Ground):
+    def open(self):
+        sys.exit("no licence")
+
+
+def test_a_model_that_quits_while_it_is_opened_is_said(cluster):
+    with pytest.raises(SolverError, match="4 of 4") as caught:
+        sweep(Quitting(), samples=4, cluster=cluster)
+    assert "called sys.exit('no licence')" in caught.value.why
 
 
 def test_too_many_failures_are_told_without_their_tracebacks(cluster):

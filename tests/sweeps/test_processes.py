@@ -1,5 +1,6 @@
 """Worker processes: scripts without a guard, nothing left behind, nothing open to the network."""
 
+import json
 import os
 import signal
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.sweeps import local_cluster
 
@@ -32,6 +34,24 @@ def report(done, total):
     if done:
         print("busy", flush=True)
 sweep(Spring(seconds=0.05), samples=2000, workers=2, progress=report, path={path!r})
+"""
+
+
+KILLED = """
+import sys
+sys.path.insert(0, {folder!r})
+from sweep_problems import LoneSpring
+from palpate.cli.console import Console
+from palpate.errors import PalpateError
+from palpate.sweeps import sweep
+def report(done, total):
+    if done == 1:
+        print("busy", flush=True)
+try:
+    sweep(LoneSpring(seconds=1.0), samples=40, cluster={address!r}, progress=report, path={path!r})
+except PalpateError as error:
+    Console().error(error)
+    sys.exit(error.exit_code)
 """
 
 
@@ -110,6 +130,52 @@ def test_a_killed_script_leaves_no_worker(busy):
     script.kill()
     script.communicate()
     assert gone(workers)
+
+
+@pytest.fixture
+def scheduler(tmp_path):
+    """A scheduler of Dask's own and its worker, each a process, and the scheduler's address."""
+    file = tmp_path / "scheduler.json"
+    begin = [sys.executable, "-m", "distributed.cli.dask_{}", "--scheduler-file", str(file), "--no-dashboard"]
+    further = {
+        "scheduler": ["--host", "127.0.0.1", "--port", "0"],
+        "worker": ["--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path)],
+    }
+    path = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    processes = [
+        subprocess.Popen(
+            [word.format(kind) for word in begin] + further[kind],
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": path},
+        )
+        for kind in further
+    ]
+    while not file.exists():
+        assert processes[0].poll() is None
+        time.sleep(0.05)
+    yield processes[0], json.loads(file.read_text())["address"]
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def test_a_killed_scheduler_keeps_what_is_solved(scheduler, tmp_path):
+    """It is killed in the midst of a solve, and the command ends in a sentence, with code 3."""
+    process, address = scheduler
+    code = KILLED.format(folder=str(Path(__file__).parent), path=str(tmp_path / "a.zarr"), address=address)
+    script = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert script.stdout.readline() == "busy\n"
+    time.sleep(0.5)  # half of a case
+    process.kill()
+    _, errors = script.communicate(timeout=60)
+    assert script.returncode == 3
+    assert errors.startswith("error: The scheduler of the sweep is lost.\n")
+    assert "Traceback" not in errors
+    parts = [Dataset.open(part) for part in (tmp_path / "a.zarr.parts").glob("part-*.zarr")]
+    assert parts
+    assert all(part.converged.all() for part in parts)
 
 
 def test_a_cluster_ends_with_its_block_also_by_an_error():

@@ -126,3 +126,19 @@ def test_the_page_is_one_file(pruned):
     assert json.loads(data)["total"] == 480
     with pytest.raises(UsageError, match="no growth"):
         growth_html(GrowthRecorder(), NAME)
+
+
+@pytest.mark.parametrize(
+    "name", ["<!--<script>", "</script><script>alert(1)</script>", "{{data}}", "&lt;\u2028"]
+)
+def test_no_name_changes_the_page(pruned, monkeypatch, name):
+    """A comment that is opened in a script hides its end, and with it the rest of the page."""
+    growth = pruned[1]
+    stated = growth.describe() | {"name": name}
+    monkeypatch.setattr(growth, "describe", lambda: stated)
+    text, plain = growth_html(growth, name), growth_html(growth, "x")
+    assert text.count("<script") == plain.count("<script") == text.count("</script")
+    assert "<!--" not in text.partition("<body>")[2]
+    assert text.count('"frames"') == 1
+    data = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1]
+    assert json.loads(data) == json.loads(json.dumps(stated))

@@ -154,8 +154,12 @@ def test_a_notebook_shows_the_page(pressed: Surrogate):
     bare = replace(pressed, meta={"name": "<b>body</b>"})
     shown = bare._repr_html_()
     assert shown.startswith("<iframe srcdoc=")
+    # no allow-same-origin: the page reaches neither the notebook nor its server
+    assert 'sandbox="allow-scripts allow-downloads"' in shown
     assert "<b>body</b>" not in shown
     assert "<title>&lt;b&gt;body&lt;/b&gt;" in bare.to_html()
+    hostile = replace(pressed, meta={"name": "<!--<script>"}).to_html()
+    assert "<!--" not in hostile.partition("<body>")[2].replace("palpate-card", "")
 
 
 def test_the_surface_and_its_fields_are_those_of_the_body(

@@ -1,4 +1,8 @@
-"""Output of the commands: progress and errors to stderr, results to stdout, as text or as one JSON object."""
+"""Output of the commands: progress and errors to stderr, results to stdout, as text or as one JSON object.
+
+Names of files and of columns, and messages of solvers may hold anything. Here they become plain texts, whose characters
+are shown and not obeyed by the terminal.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from palpate.errors import PalpateError
+from palpate.input_files import plain_text
 
 __all__ = ["Console", "advice_in_words"]
 
@@ -30,7 +35,7 @@ def advice_in_words() -> Iterator[None]:
             usual(message, category, *place)
         elif str(message) not in shown:
             shown.add(str(message))
-            print(f"warning: {message}", file=sys.stderr, flush=True)  # noqa: T201
+            print(f"warning: {plain_text(str(message))}", file=sys.stderr, flush=True)  # noqa: T201
 
     warnings.showwarning = show  # type: ignore[assignment]
     try:
@@ -54,7 +59,7 @@ class Console:
     def say(self, text: str) -> None:
         """Print one line of progress to stderr."""
         if not self.as_json:
-            print(text, file=sys.stderr, flush=True)  # noqa: T201
+            print(plain_text(text), file=sys.stderr, flush=True)  # noqa: T201
 
     @contextlib.contextmanager
     def patience(self, doing: str) -> Iterator[None]:
@@ -79,7 +84,8 @@ class Console:
     def result(self, text: str, content: Mapping[str, Any]) -> None:
         """Print the result of a command to stdout."""
         # not-a-number is no JSON: it becomes null
-        print(json.dumps(_finite(content), indent=2) if self.as_json else text, flush=True)  # noqa: T201
+        shown = json.dumps(_finite(content), indent=2) if self.as_json else plain_text(text)
+        print(shown, flush=True)  # noqa: T201
 
     def error(self, error: PalpateError) -> None:
         """Print an error: what happened, why, and what to do."""
@@ -90,9 +96,9 @@ class Console:
         from rich.text import Text
 
         rich = Rich(stderr=True, highlight=False, soft_wrap=True)
-        rich.print(Text.assemble(("error: ", "bold red"), (error.what, "bold")))
+        rich.print(Text.assemble(("error: ", "bold red"), (plain_text(error.what), "bold")))
         for line in filter(None, (error.why, error.fix)):
-            rich.print(Text(line))
+            rich.print(Text(plain_text(line)))
 
 
 def _finite(value: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from palpate.cli.console import Console
 from palpate.errors import UsageError
+from palpate.input_files import read_toml
 
 if TYPE_CHECKING:
     from palpate.dataset import Dataset
@@ -93,14 +93,7 @@ _NEXT = "Say what they mean by --input NAME=COLUMN and --output NAME=COLUMN, or 
 
 def _mapping(path: Path | None, options: Options) -> dict[str, Any]:
     """Return the mapping of a file with the words of the options in it."""
-    content: dict[str, Any] = {}
-    if path is not None:
-        try:
-            content = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise UsageError(
-                f"{path} can't be read as a mapping.", why=f"{error}.", fix="Write a TOML file."
-            ) from error
+    content: dict[str, Any] = {} if path is None else read_toml(path)
     inputs, outputs, units, coordinates = options
     for key, words in (("inputs", inputs), ("outputs", outputs)):
         entries = [{"name": name, "from": _parts(column)} for name, column in map(_pair, words)]

@@ -11,6 +11,7 @@ from palpate.cli.console import Console
 from palpate.errors import UsageError
 from palpate.file_kinds import PART_FORMATS, file_kind, way_for
 from palpate.files import require_regular, write_file
+from palpate.input_files import plain_text
 from palpate.output_files import is_marked
 
 __all__ = ["init_study", "part_line"]
@@ -70,7 +71,7 @@ def init_study(
         return
     _require_free(target, force=force)
     write_file(target, text)
-    typer.echo(f"{said}{target}: a study called {record.name}. Next: palpate sweep {target}")
+    typer.echo(plain_text(f"{said}{target}: a study called {record.name}. Next: palpate sweep {target}"))
 
 
 def part_line(notes: Sequence[str]) -> str:
@@ -106,7 +107,7 @@ def _write_sample(path: Path, *, default: bool, force: bool) -> None:
         )
     _require_free(path, force=force)
     write_sample_part(path)
-    typer.echo(f"{path}: a kidney-like organ, 5,120 triangles, in mm. Next: palpate init {path}")
+    typer.echo(plain_text(f"{path}: a kidney-like organ, 5,120 triangles, in mm. Next: palpate init {path}"))
 
 
 def _require_free(path: Path, *, force: bool) -> None:

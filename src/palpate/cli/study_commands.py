@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from palpate.cli.console import Console
 from palpate.errors import AccuracyError, UsageError
 from palpate.format import count, duration
+from palpate.input_files import open_input
 from palpate.processes import CASE_LIMIT
 
 if TYPE_CHECKING:
@@ -291,7 +292,7 @@ def is_archive(path: Path) -> bool:
     """
     if not path.is_file():
         return path.suffix == ".palpate"
-    with path.open("rb") as file:
+    with open_input(path) as file:
         return b"\0" in file.read(8)
 
 

@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 FORMAT = "palpate dataset"
-FORMAT_VERSION = 2  # 1: plane beams only, otherwise the same
+FORMAT_VERSION = 3  # 1: plane beams only; up to 2: chunks and arrays without a checksum of their own
 TIMINGS = frozenset({"solve_seconds"})  # differ from run to run: no part of a dataset's identity
 
 RESERVED = frozenset({"inputs", "sample", "rest", "triangles"})  # variables that every dataset has of itself

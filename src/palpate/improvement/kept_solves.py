@@ -18,7 +18,7 @@ import numpy as np
 
 from palpate.dataset import Dataset, Field, Layout
 from palpate.errors import UsageError
-from palpate.files import write_file
+from palpate.files import restore_folder, write_file
 from palpate.sweeps import Problem, Solver, sweep
 from palpate.sweeps.grow_sweep import CHOSEN
 from palpate.sweeps.plan import provenance
@@ -115,6 +115,7 @@ class KeptSolves:
         kept = cls(problem, path, design, options)
         if path is None:
             return kept
+        restore_folder(path)
         if path.exists():
             kept.data = Dataset.open(path)
             # compared as the file has it: tuples are lists there

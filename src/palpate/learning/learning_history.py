@@ -6,8 +6,6 @@ The picture has errors on a logarithmic axis, and units with marks where one was
 from __future__ import annotations
 
 import os
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -17,6 +15,7 @@ import numpy as np
 
 from palpate.errors import FileFormatError
 from palpate.files import writing
+from palpate.input_files import DAMAGE, open_input
 from palpate.rbf.filter.step import Event
 from palpate.sizes import require_npz
 
@@ -101,11 +100,11 @@ class History:
         """
         try:
             # opened here: on a damaged archive NumPy would leave its own handle open
-            with Path(path).open("rb") as raw:
+            with open_input(path) as raw:
                 require_npz(raw)
                 with np.load(raw, allow_pickle=False) as file:
                     parts = {f.name: file[f.name] for f in fields(cls)}
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        except (FileFormatError, *DAMAGE) as error:
             raise FileFormatError(f"{path} is not a learning history.", why=str(error)) from error
         return cls(**(parts | {"passes": int(parts["passes"])}))
 

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.input_files import plain_texts
 from palpate.network.container import MAKE_ANEW, Container, read_container, write_container
 from palpate.network.network import Network, Scaling
 from palpate.network.soundness import flaw
@@ -163,7 +164,7 @@ def load_single_network(path: str | os.PathLike[str]) -> Network:
 
 
 def _archive(container: Container) -> Archive:
-    content = json.loads(container.content, object_pairs_hook=_distinct)
+    content = plain_texts(json.loads(container.content, object_pairs_hook=_distinct))
     if not (isinstance(content, dict) and isinstance(content["meta"], dict)):
         raise TypeError("its content is not a mapping")
     tensors = dict(container.tensors)

@@ -26,6 +26,7 @@ import numpy as np
 from palpate.errors import FileFormatError, UsageError
 from palpate.file_kinds import file_kind, way_for
 from palpate.files import write_file
+from palpate.input_files import open_input
 from palpate.output_files import is_own
 
 __all__ = ["MAKE_ANEW", "Container", "read_container", "write_container"]
@@ -139,7 +140,7 @@ def _read(path: Path) -> tuple[dict[str, str], dict[str, np.ndarray]]:
 
 def _refuse_foreign(path: Path) -> None:
     """Refuse a file that doesn't begin as an archive does: eight bytes of a length, then as many of a JSON table."""
-    with path.open("rb") as file:
+    with open_input(path) as file:
         begin = file.read(9)
     if not begin:
         raise FileFormatError(f"{path} is empty.", fix=MAKE_ANEW)

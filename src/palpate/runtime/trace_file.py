@@ -7,11 +7,11 @@
     state.npz          what it remembered as the recording began
     ticks-000001.npz   half a second of ticks, by column
     events-000002.json models that answered, ticks that were lost, faults of the device in words
-    end.json           how it ended
+    end.json           how it ended, after copies of the header and of what the loop said
 
 Each entry is appended in one piece and synchronised, so that a process which is killed loses what it had not yet
 written: at most the last second. The archive's directory comes last; without it any entry is still found by its own
-header. A reader takes all entries that are whole and says that the end is missing.
+header. A reader takes all entries that are whole, and says what is missing: an end, or an entry that is damaged.
 
 Within a chunk a column whose bits are those of an earlier one is stored as its name, and one that doesn't change as
 its single value: at rest, or on a device with plain axes, most of a tick is neither.
@@ -22,6 +22,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import struct
 import zipfile
 import zlib
@@ -34,6 +35,7 @@ import numpy as np
 
 from palpate.errors import FileFormatError, ResourceError, UsageError
 from palpate.files import system_errors
+from palpate.input_files import DAMAGE, plain_texts, read_input
 from palpate.runtime.recording import FLAGS, TICK
 
 __all__ = ["COLUMNS", "FORMAT", "VERSION", "Trace", "TraceWriter", "read_trace"]
@@ -45,8 +47,8 @@ _CENTRAL = struct.Struct("<4s6H3I5H2I")
 _END = struct.Struct("<4s4H2IH")
 _DATE = 0x21  # 1 January 1980, as early as a ZIP can say
 _LARGEST_CHUNK = 256 * 1024 * 1024  # bytes of what is decoded at once: more is no half second
-_DAMAGE = (ValueError, KeyError, TypeError, ArithmeticError, RuntimeError, MemoryError, EOFError, OSError,
-           zlib.error, zipfile.BadZipFile)  # fmt: skip
+_NAME = re.compile(rb"(header|loop|end)(-copy)?\.json|state\.npz|(ticks|events)-\d{6,}\.(npz|json)")
+_SEARCHES = 10_000  # marks of entries that are looked at where one is damaged
 _MOST_ENTRIES, _LARGEST = 0xFFFF, 0xFFFFFFFF  # for which an archive can have a plain directory
 
 
@@ -83,10 +85,13 @@ class TraceWriter:
             )
         with system_errors(f"The recording {self.path} could not be begun."):
             self._file: BinaryIO = self.path.open("xb", buffering=0)
+        self._once: dict[str, Any] = {}  # records that all ticks depend on: they are repeated at the end
         self.add_json("header", {"format": FORMAT, "version": VERSION} | dict(header))
 
     def add_json(self, name: str, content: Any) -> None:
         """Append a record as JSON."""
+        if name in {"header", "loop"}:
+            self._once[name] = content
         self._append(f"{name}.json", json.dumps(content, indent=1).encode())
 
     def add_state(self, state: Mapping[str, Any]) -> None:
@@ -107,6 +112,8 @@ class TraceWriter:
         """Append how it ended, and the archive's directory."""
         if not self._file.closed:
             try:
+                for name, content in self._once.items():
+                    self.add_json(f"{name}-copy", content)
                 self.add_json("end", dict(end))
                 self._write(self._directory())
             finally:
@@ -221,7 +228,7 @@ class Trace:
 
 
 def read_trace(path: str | os.PathLike[str]) -> Trace:
-    """Read a recorded touch; one whose end is missing is read as far as it goes, with a note.
+    """Read a recorded touch; what is missing or damaged is left out, with a note.
 
     Parameters
     ----------
@@ -231,67 +238,76 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
     Raises
     ------
     FileFormatError
-        If the file is missing, is no recording, is of a later version, or is damaged before its first tick.
+        If the file is missing, is no recording, is of a later version, or is damaged throughout.
     ResourceError
         If its ticks take more than half of the memory that is free.
     """
     import psutil
 
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise FileFormatError(
-            f"{path} can't be read.", why=str(error.strerror or error), fix="Check the name."
-        ) from error
-    header: dict[str, Any] = {}
-    state, end = None, None
+    data = read_input(path)
+    records: dict[str, Any] = {}
     chunks: list[np.ndarray] = []
     events: list[Mapping[str, Any]] = []
+    gaps: list[tuple[int, int]] = []
     used, room = 0, psutil.virtual_memory().available // 2  # once in chunks, and once in one piece
-    try:
-        for name, content, used in _entries(data):  # noqa: B007 used after the loop
-            if name == "header.json":
-                header = _accepted(path, json.loads(content))
-            elif name == "state.npz":
-                state = _arrays(content)
-            elif name == "loop.json":
-                header = header | json.loads(content)
-            elif name == "end.json":
-                end = json.loads(content)
-            elif name.startswith("events-"):
-                events += [event for event in json.loads(content) if isinstance(event, dict)]
-            elif name.startswith("ticks-"):
+    for name, content, start, end in _entries(data):
+        if start > used:
+            gaps.append((used, start))
+        used = end
+        kind = name.partition(".")[0].removesuffix("-copy")
+        try:
+            if kind == "state":
+                records[kind] = _arrays(content)
+            elif kind.startswith("ticks-"):
                 chunks.append(_unfold(path, _arrays(content), room))
                 room -= chunks[-1].nbytes
-    except _DAMAGE as error:
-        raise FileFormatError(
-            f"{path} is damaged.", why=str(error), fix="Copy the file again, or record it anew."
-        ) from error
+            elif kind.startswith("events-"):
+                events += [event for event in plain_texts(json.loads(content)) if isinstance(event, dict)]
+            else:
+                records[kind] = dict(plain_texts(json.loads(content)))
+        except DAMAGE:
+            gaps.append((start, end))
+    header = _accepted(path, records.get("header"))
     if not header:
         raise FileFormatError(
             f"{path} is no recording of palpate.",
-            why="It doesn't begin with the header of one.",
+            why="It has no header of one.",
             fix="Record one with palpate run MODEL --record FILE.",
         )
+    if gaps and not chunks:
+        raise FileFormatError(
+            f"{path} is damaged.",
+            why="No tick of it can be read.",
+            fix="Copy the file again, or record it anew.",
+        )
     ticks = np.concatenate(chunks) if chunks else np.zeros(0, TICK)
-    return Trace(path, header, ticks, state, tuple(events), end, len(data), _missing(data, used, end))
+    notes = _missing(data, used, gaps, has_end="end" in records)
+    header |= records.get("loop", {})
+    return Trace(
+        path, header, ticks, records.get("state"), tuple(events), records.get("end"), len(data), notes
+    )
 
 
-def _missing(data: bytes, used: int, end: Mapping[str, Any] | None) -> tuple[str, ...]:
-    if end is not None:
-        return ()
+def _missing(data: bytes, used: int, gaps: list[tuple[int, int]], *, has_end: bool) -> tuple[str, ...]:
+    """Return in words what the file is without."""
     rest = len(data) - used
-    if data.find(b"PK\5\6", used) >= 0:  # the directory that ends a whole one
-        return (f"The recording is damaged at byte {used}: the {rest} bytes from there on were left out.",)
-    cut = f"; the last {rest} bytes are an unfinished chunk and were left out" if rest else ""
-    return (f"The recording has no end: its program was killed, or still records{cut}.",)
+    if not has_end and rest and data.find(b"PK\5\6", used) >= 0:  # the directory that ends a whole one
+        gaps, rest = [*gaps, (used, len(data))], 0
+    notes = [
+        f"The recording is damaged at byte {at}: {to - at} bytes from there on were left out."
+        for at, to in gaps
+    ]
+    if not has_end and not notes:
+        cut = f"; the last {rest} bytes are an unfinished chunk and were left out" if rest else ""
+        notes.append(f"The recording has no end: its program was killed, or still records{cut}.")
+    return tuple(notes)
 
 
 def _accepted(path: Path, header: Any) -> dict[str, Any]:
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         return {}
-    if int(header["version"]) > VERSION:
+    if not isinstance(header.get("version"), int) or header["version"] > VERSION:
         raise FileFormatError(
             f"{path} was recorded by a later version of palpate.",
             why=f"Its layout is {header['version']}; this version reads up to {VERSION}.",
@@ -300,20 +316,33 @@ def _accepted(path: Path, header: Any) -> dict[str, Any]:
     return dict(header)
 
 
-def _entries(data: bytes) -> Iterator[tuple[str, bytes, int]]:
-    """Yield name, content and end of each whole entry of a ZIP archive, by the entries' own headers."""
-    place = 0
-    while place + _LOCAL.size <= len(data):
-        mark, _, flags, method, _, _, checksum, size, _, names, extra = _LOCAL.unpack_from(data, place)
-        start = place + _LOCAL.size + names + extra
-        if mark != b"PK\3\4" or flags & 8 or method != 0 or start + size > len(data):
-            return
-        content = data[start : start + size]
-        if zlib.crc32(content) != checksum:
-            return
-        name = data[place + _LOCAL.size : place + _LOCAL.size + names].decode("utf-8", "replace")
-        place = start + size
-        yield name, content, place
+def _entries(data: bytes) -> Iterator[tuple[str, bytes, int, int]]:
+    """Yield name, content, begin and end of each whole entry of a ZIP archive, by the entries' own headers.
+
+    What lies between is damaged. Within it the next entry is searched for by its mark.
+    """
+    place, searches = 0, 0
+    while place >= 0 and searches < _SEARCHES:
+        if entry := _entry_at(data, place):
+            yield entry
+            place = entry[-1]
+        else:
+            searches += 1
+            place = data.find(b"PK\3\4", place + 1)
+
+
+def _entry_at(data: bytes, place: int) -> tuple[str, bytes, int, int] | None:
+    """Return the entry that begins at a place; None where none of a recording's does, or it is damaged."""
+    if place + _LOCAL.size > len(data):
+        return None
+    mark, _, flags, method, _, _, checksum, size, _, names, extra = _LOCAL.unpack_from(data, place)
+    begin = place + _LOCAL.size
+    start = begin + names + extra
+    known = _NAME.fullmatch(data, begin, min(begin + names, len(data)))
+    if not known or mark != b"PK\3\4" or flags & 8 or method != 0 or start + size > len(data):
+        return None
+    content = data[start : start + size]
+    return (known[0].decode(), content, place, start + size) if zlib.crc32(content) == checksum else None
 
 
 def _npz(arrays: Mapping[str, Any]) -> bytes:

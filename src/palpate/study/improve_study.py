@@ -9,6 +9,7 @@ from typing import Any
 
 from palpate.dataset import Dataset
 from palpate.errors import FileFormatError, UsageError
+from palpate.files import restore_folder
 from palpate.improvement import ImprovementStep, improve
 from palpate.improvement.improve import Interest
 from palpate.processes import CASE_LIMIT
@@ -89,6 +90,7 @@ def improve_study(
     problem = study.problem()
     wanted = study.test.arguments(problem)
     assert wanted is not None  # a probe's test is never empty
+    restore_folder(paths.data)
     finished = Dataset.open(paths.data).ok if paths.data.exists() else None
     steps = improve(
         problem,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, get_args
@@ -14,8 +13,9 @@ import tomlkit
 from pydantic import BaseModel, ValidationError
 from tomlkit.items import AoT
 
-from palpate.errors import StudyError
+from palpate.errors import FileFormatError, StudyError
 from palpate.file_kinds import file_kind, way_for
+from palpate.input_files import read_toml
 from palpate.output_files import STUDY_HEAD
 from palpate.record_complaints import complaints, unit_in
 from palpate.study.study import Study
@@ -54,23 +54,17 @@ def read_study(path: str | os.PathLike[str]) -> Study:
             f"{path} is {kind}, not a study file.",
             fix=f"{way_for(path)} A study file is a text, NAME.toml: write one with `palpate init`.",
         )
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
+    if not path.exists():
         fix = {
             "a dataset of solves": "Write one with `palpate sweep STUDY.toml`, or give the path of another.",
             "a model file": "Name a study file, NAME.toml; `palpate learn` writes the model file.",
         }.get(kind, "Write one with `palpate init`.")
-        raise StudyError(f"{path} does not exist.", fix=fix) from error
-    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"{path} does not exist.", fix=fix)
+    try:
+        content = read_toml(path)
+    except FileFormatError as error:
         raise StudyError(
-            f"{path} can't be read as a study.",
-            why=f"{error}.",
-            fix="A study is a text file: write one with `palpate init`.",
-        ) from error
-    except tomllib.TOMLDecodeError as error:
-        raise StudyError(
-            f"{path} is not valid TOML.", why=f"{error}.", fix=_way_to_toml(error, path)
+            error.what, why=error.why, fix=f"{error.fix} `palpate init` writes a study."
         ) from error
     try:
         return Study.model_validate(_beside(path.parent, _from_first_version(content)))
@@ -81,17 +75,6 @@ def read_study(path: str | os.PathLike[str]) -> Study:
             fix=f"`palpate init {_example_of(content)} --print` shows every key with its meaning; "
             "`palpate schema` is for editors.",
         ) from error
-
-
-def _way_to_toml(error: tomllib.TOMLDecodeError, path: Path) -> str:
-    """Return what makes TOML of a file that is none."""
-    if "overwrite" in str(error):
-        return "A key or a table stands there twice: keep one."
-    line = re.search(r"at line ([0-9]+)", str(error))
-    text = path.read_text(encoding="utf-8").split("\n")[int(line[1]) - 1] if line else ""
-    if re.search(r"= *[-+]?[0-9]+,[0-9]+ *(#|$)", text.strip()):
-        return "A number without quotes has a decimal point: 0.45, not 0,45."
-    return "Correct that line."
 
 
 def _from_first_version(content: dict[str, Any]) -> dict[str, Any]:

@@ -148,7 +148,7 @@ class Surrogate:
         source = html.escape(page, quote=True)
         return (
             f'<iframe srcdoc="{source}" title="{html.escape(self.name, quote=True)}" '
-            'style="width: 100%; height: 640px; border: 0"></iframe>'
+            'sandbox="allow-scripts allow-downloads" style="width: 100%; height: 640px; border: 0"></iframe>'
         )
 
     def with_energy(self, energy: LearntEnergy, meta: Mapping[str, Any] | None = None) -> Surrogate:

@@ -19,6 +19,7 @@ import numpy as np
 
 from palpate.dataset import BOOKKEEPING, Field
 from palpate.errors import UsageError
+from palpate.input_files import plain_text
 from palpate.supervised import Child, ChildEnded
 from palpate.sweeps.problem import Answer, Resettable, Solver
 
@@ -221,7 +222,7 @@ def open_problem(identity: str, problem: bytes, schema: tuple[Field, ...]) -> Fa
         else:
             del last
             _Session.opened = _Opened(identity, pickle.loads(problem).open(), schema)
-    except Exception as error:  # noqa: BLE001 - the problem is the user's own
+    except BaseException as error:  # noqa: BLE001 - the problem is the user's own, which may also call sys.exit
         return _failure(error)
     return None
 
@@ -236,21 +237,27 @@ def solve_case(x: np.ndarray) -> Columns | Failure:
         answer = opened.solver.solve(x)
         row["solve_seconds"][0] = time.perf_counter() - begun
         _record(row, opened.schema, answer)
-    except Exception as error:  # noqa: BLE001 - the problem is the user's own
+    except BaseException as error:  # noqa: BLE001 - as above
         return _failure(error)
     _Session.opened = opened
     return row
 
 
-def _failure(error: Exception) -> Failure:
-    told = traceback.TracebackException.from_exception(error)
-    told.stack = traceback.StackSummary.from_list([f for f in told.stack if f.filename != __file__])
-    return Failure(f"{type(error).__name__}: {error}", "".join(told.format()))
+def _failure(error: BaseException) -> Failure:
+    """Return an exception as text. Ctrl-C never comes here: it is for the process that started this one."""
+    report = traceback.TracebackException.from_exception(error)
+    report.stack = traceback.StackSummary.from_list([f for f in report.stack if f.filename != __file__])
+    if isinstance(error, SystemExit):
+        reason = f"called sys.exit({'' if error.code is None else repr(error.code)})"
+    else:  # by the report, which takes exceptions that can't be written as text
+        reason = "".join(report.format_exception_only()).strip().removeprefix("builtins.")
+        reason = reason if isinstance(error, Exception) else f"raised {reason}"
+    return Failure(plain_text(reason), plain_text("".join(report.format())))
 
 
 def _record(row: Columns, schema: Sequence[Field], answer: Answer) -> None:
     row["converged"][0] = answer.converged
-    row["message"][0] = answer.message
+    row["message"][0] = plain_text(str(answer.message))
     row["iterations"][0] = answer.iterations
     row["residual"][0] = answer.residual
     if not answer.converged:  # the fields of a failed solve stay NaN

@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import FileFormatError
-from palpate.files import system_errors
+from palpate.files import restore_folder, system_errors
 from palpate.sweeps.ledger import Ledger
 from palpate.sweeps.plan import Plan, make_plan
 
@@ -47,6 +47,7 @@ def grow(path: str | os.PathLike[str], problem: Any, arguments: Mapping[str, Any
     """
     path, plan = Path(path), _plan(problem, arguments)
     try:
+        restore_folder(path)
         finished = Dataset.open(path) if path.exists() else None
     except FileFormatError:
         finished = None  # `sweep` says what is wrong with it

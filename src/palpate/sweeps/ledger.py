@@ -15,7 +15,7 @@ from pathlib import Path
 
 from palpate.dataset import Dataset
 from palpate.errors import FileFormatError, ResourceError, UsageError
-from palpate.files import system_errors, write_file
+from palpate.files import restore_folder, system_errors, write_file
 
 __all__ = ["Ledger"]
 
@@ -55,6 +55,7 @@ class Ledger:
         FileFormatError
             If what is there can't be read.
         """
+        restore_folder(self.path)
         if not self.path.exists():
             return None
         try:

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import logging
 import queue
 import signal
 import threading
 import uuid
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -73,11 +75,18 @@ def _closing(client: distributed.Client) -> Iterator[distributed.Client]:
         yield client
     finally:
         connected = client.status == "running"
+        logger = logging.getLogger(
+            "distributed.client"
+        )  # it tells of the end of its attempts to connect again
+        level = logger.level
+        logger.setLevel(level if connected else logging.CRITICAL)
         try:
             client.close()
         except (OSError, ValueError):
             if connected:
                 raise
+        finally:
+            logger.setLevel(level)
 
 
 def _client(cluster: Any) -> distributed.Client:
@@ -169,8 +178,9 @@ def run(
             except queue.Empty:
                 revive()
                 continue
+            _require_scheduler(client, future)
             chain = pending.pop(future)
-            answers, error = _outcome(future)
+            answers, error = _outcome(client, future)
             if answers is not None:
                 accept(chain.rows, answers)
             elif chain.tries < _TRIES and (error is None or _is_death(error)):
@@ -188,26 +198,33 @@ def _task(problem: Problem, schema: Sequence[Field], case_limit: float) -> Task:
     return Task(content, identity, tuple(schema), case_limit, uuid.uuid4().hex)
 
 
-def _require_scheduler(client: distributed.Client) -> None:
-    if client.status != "running":  # it tries to connect again, but what was asked for is forgotten
+def _require_scheduler(client: distributed.Client, future: Any = None) -> None:
+    """Refuse to go on without the scheduler: a client tries to connect again, but what was asked for is forgotten.
+
+    Its answers are cancelled first; only then does the client notice that its status is another one.
+    """
+    if client.status != "running" or (future is not None and future.cancelled()):
         raise ResourceError(
-            f"The scheduler of the sweep is lost ({client.status}).",
-            why="It ended, or the connection to it broke.",
+            "The scheduler of the sweep is lost.",
+            why="It ended, was restarted, or the connection to it broke.",
             fix=f"Start it again. {_KEPT}",
         )
 
 
-def _outcome(future: Any) -> tuple[Columns | None, BaseException | None]:
+def _outcome(client: distributed.Client, future: Any) -> tuple[Columns | None, BaseException | None]:
     """Return the answers, or the error, or neither where the answers were lost."""
     try:
         error = None if future.status == "finished" else future.exception(timeout=_FETCH)
         return (future.result(timeout=_FETCH) if error is None else None), error
     except TimeoutError:
         return None, None
+    except CancelledError:
+        _require_scheduler(client, future)
+        return None, None
 
 
 def _is_death(error: BaseException) -> bool:
-    return type(error).__name__ in {"KilledWorker", "FutureCancelledError", "CancelledError"}
+    return type(error).__name__ == "KilledWorker"
 
 
 def _reason(error: BaseException | None) -> str:

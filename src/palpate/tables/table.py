@@ -45,6 +45,7 @@ __all__ = ["Column", "Table", "read_table"]
 
 _MAKE = "Write a line of names such as t [s], x [mm], F [N], and rows of numbers."
 _WORKBOOKS = {".xlsx", ".xlsm"}
+_SHOWN = 20  # names of columns that a message lists
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ class Table:
         near = difflib.get_close_matches(name, self.names, n=1)
         raise UsageError(
             f"{self.path} has no column {name!r}.",
-            why=f"Its columns are {', '.join(map(repr, self.names))}.",
+            why=f"Its columns are {', '.join(map(repr, self.names[:_SHOWN]))}{', …' * (len(self.names) > _SHOWN)}.",
             fix=f"Did you mean {near[0]!r}?" if near else "Choose among these.",
         )
 

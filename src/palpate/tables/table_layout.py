@@ -177,20 +177,32 @@ def _cells(line: str, separator: str | None) -> list[str] | None:
     if separator == " ":
         text = line.strip()
         if '"' in text:
-            return next(csv.reader([text], delimiter=" ", skipinitialspace=True))
+            return _quoted_cells(text, " ", strict=False)
         words = text.split()
         return words if any(map(is_numeral, words)) else _words(text)
     if '"' not in line:
         return [line] if separator is None else line.split(separator)
     try:
-        return next(
-            csv.reader([line], delimiter=separator or "\x1f", skipinitialspace=True, strict=True), None
-        )
+        return _quoted_cells(line, separator or "\x1f", strict=True)
     except csv.Error as error:
         if "unexpected end" in str(error):
             return None
         # a quote inside of a cell, such as of inches
         return [part.strip().strip('"') for part in line.split(separator)] if separator else [line]
+
+
+def _quoted_cells(line: str, separator: str, *, strict: bool) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=separator, skipinitialspace=True, strict=strict), [])
+    except csv.Error as error:
+        if "field limit" not in str(error):
+            raise
+        raise UsageError(
+            f"a cell holds more than {csv.field_size_limit():,} characters, in the line that begins with "
+            f"{line[:20]!r}.",
+            why="No number or name is as long; a quote that opens there may not be closed.",
+            fix="Correct the cell, or export the table again.",
+        ) from error
 
 
 def _words(text: str) -> list[str]:

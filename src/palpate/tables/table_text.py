@@ -8,10 +8,10 @@ import re
 from pathlib import Path
 
 from palpate.errors import FileFormatError
+from palpate.input_files import plain_text, read_input
 
 __all__ = ["read_table_text"]
 
-_LARGEST = 4_000_000_000  # bytes of a file that is read whole
 _MARKS = (  # longest first: the mark of UTF-16 begins that of UTF-32
     (codecs.BOM_UTF32_LE, "utf-32-le"),
     (codecs.BOM_UTF32_BE, "utf-32-be"),
@@ -55,7 +55,7 @@ def read_table_text(path: str | os.PathLike[str], encoding: str | None = None) -
         If the file can't be read, is of another kind, or is not in this encoding.
     """
     path = Path(path)
-    content = _content(path)
+    content = read_input(path)
     for magic, kind, fix in _OTHERS:
         if content[:64].lstrip()[: len(magic)].lower() == magic.lower():
             raise FileFormatError(f"{path} can't be read as a table: it is {kind}.", fix=fix)
@@ -68,21 +68,7 @@ def read_table_text(path: str | os.PathLike[str], encoding: str | None = None) -
             why="The file is damaged, no text, or in another encoding.",
             fix="Export it as CSV in UTF-8, or name its encoding: encoding='utf-16' (--encoding).",
         )
-    return text, note
-
-
-def _content(path: Path) -> bytes:
-    try:
-        size = path.stat().st_size
-        if size > _LARGEST:
-            raise FileFormatError(
-                f"{path} has {size / 1e9:.1f} GB; a table is read whole.", fix="Split it, or export less."
-            )
-        return path.read_bytes()
-    except OSError as error:
-        raise FileFormatError(
-            f"{path} can't be read.", why=f"{error.strerror or error}.", fix="Give the path of a text table."
-        ) from error
+    return plain_text(text), note
 
 
 def _decoded(path: Path, content: bytes, encoding: str | None) -> tuple[str, str]:

@@ -27,6 +27,7 @@ from palpate.export.field_tables import PROMISE, SURFACE, field_tables
 from palpate.export.wasm_core import WasmCore, wasmtime_module
 from palpate.export.weights_block import FIELD, WeightsBlock
 from palpate.files import write_file
+from palpate.format import script_json
 from palpate.output_files import require_outputs, with_seal
 from palpate.runtime.devices import device_traits
 from palpate.runtime.touchable import touchable
@@ -326,7 +327,7 @@ def _document(name: str, parts: Mapping[str, str], card: str) -> str:
 </head>
 {body.group(0).replace("</body>", "")}
 {packed}
-<script type="application/json" id="palpate-card">{card.replace("<", chr(92) + "u003c")}</script>
+<script type="application/json" id="palpate-card">{script_json(card)}</script>
 <script>{script}</script>
 </body>
 </html>

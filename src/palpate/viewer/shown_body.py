@@ -11,16 +11,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 
+from palpate.dataset.readers.vtk_files import Grid, read_series, read_vtu
 from palpate.errors import FileFormatError, UsageError
 from palpate.viewer.messages import PROTOCOL, FieldInfo, Shown, Step, StepInfo, Surface
 from palpate.viewer.surfaces import Split, outer_triangles, split
 
 __all__ = ["ShownBody", "ShownStep", "body_of", "body_of_dataset", "body_of_file"]
 
+_CORNERS = (
+    ("tetra", 4),
+    ("triangle", 3),
+)  # kinds of cells, and their corners: further nodes lie between these
 VON_MISES, STRETCH = "von Mises stress", "largest principal stretch"
 
 
@@ -320,35 +324,31 @@ def _radius(record: Any) -> float | None:
 
 def _series(path: Path, name: str) -> ShownBody:
     try:
-        rows = ElementTree.parse(path).getroot().findall("Collection/DataSet")
-    except ElementTree.ParseError as error:
-        raise _unreadable(path, str(error)) from error
-    files = [path.parent / row.get("file", "") for row in rows]
-    if not files:
-        raise _unreadable(path, "It names no files.")
-    return _vtu_body(files, [f"t = {row.get('timestep', '')}" for row in rows], name)
+        entries = read_series(path)
+    except FileFormatError as error:
+        raise _unreadable(path, f"{error.what} {error.why}".strip()) from error
+    return _vtu_body([file for _, file in entries], [f"t = {time}" for time, _ in entries], name)
 
 
 def _vtu_body(paths: list[Path], labels: list[str], name: str) -> ShownBody:
     first = _read(paths[0])
-    cells = first.cells_dict
-    if "tetra" in cells:
-        triangles = outer_triangles(cells["tetra"])
-    elif "triangle" in cells:
-        triangles = cells["triangle"]
+    tetrahedra, flat = ([nodes[:, :n] for k, nodes in first.cells if k == kind] for kind, n in _CORNERS)
+    if tetrahedra:
+        triangles = outer_triangles(np.concatenate(tetrahedra))
+    elif flat:
+        triangles = np.concatenate(flat)
     else:
-        raise _unreadable(
-            paths[0], f"Its cells are {', '.join(cells) or 'none'}; tetrahedra or triangles are needed."
-        )
+        kinds = ", ".join(kind for kind, _ in first.cells) or "none"
+        raise _unreadable(paths[0], f"Its cells are {kinds}; tetrahedra or triangles are needed.")
     meshes = [first, *map(_read, paths[1:])]
     steps = [_vtu_step(mesh, label) for mesh, label in zip(meshes, labels, strict=True)]
     return ShownBody(name, np.asarray(first.points, dtype=float), triangles, steps, units={VON_MISES: "Pa"})
 
 
-def _vtu_step(mesh: Any, label: str) -> ShownStep:
+def _vtu_step(mesh: Grid, label: str) -> ShownStep:
     count = len(mesh.points)
     values = {k: np.asarray(v, dtype=float) for k, v in mesh.point_data.items() if np.shape(v) == (count,)}
-    notes = mesh.field_data
+    notes = {name: values for name, values in mesh.field_data.items() if np.size(values)}
     ball = None
     if "probe centre and radius" in notes:
         probe = np.asarray(notes["probe centre and radius"], dtype=float).ravel()
@@ -359,11 +359,8 @@ def _vtu_step(mesh: Any, label: str) -> ShownStep:
     return ShownStep(displacement, values, ball, label, _figures(response, energy, ball))
 
 
-def _read(path: Path) -> Any:
-    import meshio
-    from meshio import vtu  # meshio.read ends the program where it can't read
-
+def _read(path: Path) -> Grid:
     try:
-        return vtu.read(path)
-    except (meshio.ReadError, OSError, ElementTree.ParseError, ValueError) as error:
-        raise _unreadable(path, str(error) or "It is no VTU file.") from error
+        return read_vtu(path)
+    except FileFormatError as error:
+        raise _unreadable(path, error.why or error.what) from error

@@ -321,7 +321,7 @@ def test_a_mapping_is_read_from_a_file(tmp_path):
     path.write_text('name = "a"\n[[inputs]]\nname = "F"\n')
     assert read_mapping(path).inputs[0].columns == "F"
     path.write_text("name = ")
-    with pytest.raises(UsageError, match="can't be read as a mapping"):
+    with pytest.raises(UsageError, match="is not valid TOML"):
         read_mapping(path)
 
 

@@ -32,6 +32,7 @@ from palpate.dataset.measured.measured_columns import NAMES, Columns, Measuremen
 from palpate.errors import FileFormatError, UsageError
 from palpate.files import write_file
 from palpate.format import count
+from palpate.input_files import plain_texts, read_input
 from palpate.tables import Column, Table, named_quantity, read_table
 
 __all__ = ["read_measurements", "write_measurements"]
@@ -151,8 +152,8 @@ def _sidecar(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        side = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        side = plain_texts(json.loads(read_input(path)))
+    except (ValueError, RecursionError) as error:
         raise FileFormatError(
             f"{path} is no JSON.", why=str(error), fix="Mend it or take it away."
         ) from error

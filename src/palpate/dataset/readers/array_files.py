@@ -7,8 +7,8 @@ vectors; ``points`` (place, 2 or 3) are the places and ``triangles`` (t, 3) thei
 
 from __future__ import annotations
 
+import importlib.util
 import re
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -16,7 +16,9 @@ import numpy as np
 
 from palpate.dataset.readers.results import Column, Places, Results, refuse
 from palpate.errors import UsageError
+from palpate.input_files import DAMAGE, open_input, plain_text
 from palpate.sizes import require_npz
+from palpate.supervised import read_in_child
 
 __all__ = ["name_and_unit", "read_npz", "read_parquet"]
 
@@ -102,11 +104,11 @@ def read_npz(path: Path) -> Results:
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
     try:
-        with path.open("rb") as file:
+        with open_input(path) as file:
             require_npz(file)
             with np.load(file, allow_pickle=False) as archive:
                 return {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile) as error:
+    except DAMAGE as error:
         raise refuse(
             path,
             None,
@@ -117,7 +119,7 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def _columns_of(name: str, values: np.ndarray) -> list[Column]:
-    plain, unit = name_and_unit(name)
+    plain, unit = name_and_unit(plain_text(name))
     where = "nodes" if values.ndim > 1 else ""
     if values.ndim < 3:
         return [Column(plain, values, unit, places=where)]
@@ -156,16 +158,20 @@ def read_parquet(path: Path) -> Results:
     UsageError
         If PyArrow isn't installed.
     """
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError:
+    if importlib.util.find_spec("pyarrow") is None:
         raise UsageError(
             f"{path} can't be read without PyArrow.", fix="Install it: pip install 'palpate[parquet]'"
-        ) from None
+        )
+    return read_in_child(_read_parquet, path)
+
+
+def _read_parquet(path: Path) -> Results:
+    import pyarrow
+    from pyarrow import parquet
+
     try:
         table = parquet.read_table(path)
-    except (OSError, pyarrow.ArrowException) as error:
+    except (pyarrow.ArrowException, *DAMAGE) as error:
         raise refuse(
             path, None, "the table can't be read.", why=f"It is damaged or cut short: {error}."
         ) from error
@@ -175,8 +181,8 @@ def read_parquet(path: Path) -> Results:
             notes.append(f"Skipped {entry.name}: a column of {entry.type}.")
             continue
         metadata: Mapping[bytes, bytes] = entry.metadata or {}
-        name, unit = name_and_unit(entry.name)
-        unit = metadata[b"unit"].decode() if b"unit" in metadata else unit
+        name, unit = name_and_unit(plain_text(entry.name))
+        unit = plain_text(metadata[b"unit"].decode(errors="replace")) if b"unit" in metadata else unit
         columns.append(Column(name, np.asarray(values.to_numpy(), dtype=float), unit))
     if not columns or not table.num_rows:
         raise refuse(path, None, "the table has no rows of numbers.")

@@ -6,10 +6,11 @@ import codecs
 from pathlib import Path
 
 from palpate.dataset.readers.results import refuse
+from palpate.errors import FileFormatError
+from palpate.input_files import open_input, plain_text, read_input
 
-__all__ = ["LARGEST", "head_of", "read_bytes", "read_lines", "to_number"]
+__all__ = ["head_of", "read_bytes", "read_lines", "to_number"]
 
-LARGEST = 4_000_000_000  # bytes of a file that is read whole
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF16_LE, "utf-16"),
@@ -25,25 +26,7 @@ def read_bytes(path: Path) -> bytes:
     FileFormatError
         If it is missing, empty, unreadable or larger than 4 GB.
     """
-    try:
-        size = path.stat().st_size
-        if size > LARGEST:
-            raise refuse(
-                path,
-                None,
-                f"the file has {size / 1e9:.1f} GB.",
-                why="It would be read into memory whole.",
-                fix="Export fewer quantities, places or times at once.",
-            )
-        content = path.read_bytes()
-    except OSError as error:
-        raise refuse(
-            path,
-            None,
-            "the file can't be read.",
-            why=f"{error.strerror or error}.",
-            fix="Give the path of a file.",
-        ) from error
+    content = read_input(path)
     if not content.strip():
         raise refuse(path, None, "the file is empty.")
     return content
@@ -64,15 +47,15 @@ def read_lines(path: Path) -> list[str]:
             "the file holds bytes that are no text.",
             fix="Export the results as text.",
         )
-    return text.splitlines()
+    return plain_text(text).splitlines()
 
 
 def head_of(path: Path, size: int = 4096) -> str:
     """Return the beginning of a file as text, "" where it can't be read; for telling its format."""
     try:
-        with path.open("rb") as file:
+        with open_input(path) as file:
             content = file.read(size)
-    except OSError:
+    except (FileFormatError, OSError):
         return ""
     encoding = next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
     return content.decode(encoding, errors="replace")

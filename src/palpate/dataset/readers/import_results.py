@@ -25,6 +25,7 @@ from palpate.dataset.readers.slope_of_energy import contradiction
 from palpate.dataset.schema import Field, conjugate_unit
 from palpate.errors import UsageError
 from palpate.format import count
+from palpate.input_files import read_input
 from palpate.units import Range, parse_quantity
 
 __all__ = ["Imported", "import_results", "read_files"]
@@ -294,7 +295,7 @@ def _about_coordinates(results: Results, nodal: Sequence[str]) -> list[str]:
 def _provenance(
     results: Results, mapping: ImportMapping, paths: Sequence[Path], notes: Sequence[str]
 ) -> dict[str, Any]:
-    files = [{"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()} for path in paths]
+    files = [{"name": path.name, "sha256": hashlib.sha256(read_input(path)).hexdigest()} for path in paths]
     return {
         "words": mapping.name,
         "problem": {

@@ -24,14 +24,13 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from palpate.errors import UsageError
+from palpate.input_files import read_toml
 from palpate.record_complaints import complaints
 from palpate.records import Count, Metres, Number, Record, in_si
 
@@ -237,13 +236,7 @@ def read_mapping(source: str | os.PathLike[str] | Mapping[str, Any] | ImportMapp
         return source
     where = "The mapping"
     if not isinstance(source, Mapping):
-        where, path = os.fspath(source), Path(source)
-        try:
-            source = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise UsageError(
-                f"{path} can't be read as a mapping.", why=f"{error}.", fix="Write a TOML file."
-            ) from error
+        where, source = os.fspath(source), read_toml(source)
     try:
         return ImportMapping.model_validate(dict(source))
     except ValidationError as error:

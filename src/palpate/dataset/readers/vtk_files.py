@@ -1,7 +1,8 @@
 """Files of the VTK family, as ParaView and many solvers write them: ``.vtu``, ``.vtp``, ``.vtk``, and series ``.pvd``.
 
 PyVista reads them where it is installed (``pip install 'palpate[results]'``). Without it meshio, which palpate has
-always, reads ``.vtu`` files of the usual codings.
+always, reads ``.vtu`` files of the usual codings. Both work in a child process: VTK is written in C++ and some files
+crash it, and packed numbers may take any memory.
 """
 
 from __future__ import annotations
@@ -18,10 +19,13 @@ import numpy as np
 from palpate.dataset.readers.results import TIME, Column, Places, Results, refuse
 from palpate.dataset.readers.surface import outer_surface
 from palpate.errors import FileFormatError, UsageError
+from palpate.input_files import DAMAGE, plain_text, read_input
+from palpate.supervised import read_in_child
 
-__all__ = ["SUFFIXES", "read_vtk"]
+__all__ = ["SUFFIXES", "Grid", "read_series", "read_vtk", "read_vtu"]
 
 FORMAT = "VTK"
+_LARGEST_SERIES = 50_000_000  # bytes of a list of files
 SUFFIXES = (".pvd", ".vtu", ".vtp", ".vtk")
 INSTALL = "Install PyVista: pip install 'palpate[results]'"
 # VTK's numbers of the cells that have faces; the second of a pair has nodes between the corners
@@ -46,7 +50,7 @@ _TENSORS = {6: ("xx", "yy", "zz", "xy", "yz", "xz")}  # VTK's order of a symmetr
 
 
 @dataclass(frozen=True, eq=False)
-class _Grid:
+class Grid:
     """Content of one file: nodes, cells by kind, and arrays of nodes, of cells and of the whole."""
 
     points: np.ndarray
@@ -71,7 +75,10 @@ def read_vtk(path: Path) -> Results:
     """
     if path.suffix.lower() != ".pvd":
         return _collect(path, [_read(path)], None)
-    times, files = _series(path)
+    entries = read_series(path)
+    times = np.array([_time(path, time) for time, _ in entries])
+    order = np.argsort(times, kind="stable")
+    times, files = times[order], [entries[i][1] for i in order]
     grids = [_read(file) for file in files]
     for file, grid in zip(files, grids, strict=True):
         if grid.points.shape != grids[0].points.shape or grid.count != grids[0].count:
@@ -94,11 +101,24 @@ def read_vtk(path: Path) -> Results:
     return _collect(path, grids, times)
 
 
-def _series(path: Path) -> tuple[np.ndarray, list[Path]]:
-    """Return the times and files of a collection, in the order of time."""
+def _time(path: Path, text: str) -> float:
     try:
-        rows = ElementTree.parse(path).getroot().findall("Collection/DataSet")
-    except (ElementTree.ParseError, OSError) as error:
+        return float(text)
+    except ValueError:
+        raise refuse(path, None, f"the time step {text!r} is no number.") from None
+
+
+def read_series(path: Path) -> list[tuple[str, Path]]:
+    """Return the time steps, as they stand there, and the files of a ``.pvd`` collection.
+
+    Raises
+    ------
+    FileFormatError
+        If it can't be read, names no files, or has several parts for one time.
+    """
+    try:
+        rows = ElementTree.fromstring(read_input(path, largest=_LARGEST_SERIES)).findall("Collection/DataSet")
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
         line = error.position[0] if isinstance(error, ElementTree.ParseError) else None
         raise refuse(path, line, "the series can't be read.", why=f"{error}.") from error
     if len({row.get("part", "0") for row in rows}) > 1:
@@ -108,33 +128,37 @@ def _series(path: Path) -> tuple[np.ndarray, list[Path]]:
             "the series has several parts for one time.",
             fix="Export one part, or the parts apart.",
         )
-    entries = []
-    for row in rows:
-        try:
-            entries.append((float(row.get("timestep", "nan")), path.parent / row.get("file", "")))
-        except ValueError:
-            raise refuse(path, None, f"the time step {row.get('timestep')!r} is no number.") from None
-    if not entries:
+    if not rows:
         raise refuse(
             path, None, "the series names no files.", why="It is empty, or no collection of DataSet entries."
         )
-    entries.sort(key=lambda entry: entry[0])
-    return np.array([time for time, _ in entries]), [file for _, file in entries]
+    return [(plain_text(row.get("timestep", "nan")), path.parent / row.get("file", "")) for row in rows]
 
 
-def _read(path: Path) -> _Grid:
-    if not path.is_file():
+def _read(path: Path) -> Grid:
+    if not path.exists():
         raise refuse(path, None, "there is no such file.", fix="Keep the files of a series together.")
     if importlib.util.find_spec("pyvista") is not None:
-        return _read_with_pyvista(path)
+        return read_in_child(_read_with_pyvista, path)
     if path.suffix.lower() == ".vtu":
-        return _read_with_meshio(path)
+        return read_vtu(path)
     raise UsageError(
         f"{path} can't be read without PyVista.", why="meshio reads .vtu files only.", fix=INSTALL
     )
 
 
-def _read_with_pyvista(path: Path) -> _Grid:
+def read_vtu(path: Path) -> Grid:
+    """Read a ``.vtu`` file of a usual coding, by meshio.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, damaged, or of a coding that meshio does not know.
+    """
+    return read_in_child(_read_with_meshio, path)
+
+
+def _read_with_pyvista(path: Path) -> Grid:
     import pyvista
 
     faults: list[str] = []
@@ -144,12 +168,13 @@ def _read_with_pyvista(path: Path) -> _Grid:
         reader.reader.AddObserver("ErrorEvent", lambda *_: faults.append("VTK reports an error"))
         grid: Any = reader.read()
         whole = grid.cast_to_unstructured_grid()
-    except (OSError, ValueError, TypeError, RuntimeError, AttributeError) as error:
+        cells = [(_KINDS[kind], nodes) for kind, nodes in whole.cells_dict.items() if kind in _KINDS]
+    except DAMAGE as error:
         raise _damage_error(path, str(error)) from error
     if faults or not whole.n_points:
         raise _damage_error(path, faults[0] if faults else "it has no nodes")
-    cells = [(_KINDS[kind], nodes) for kind, nodes in whole.cells_dict.items() if kind in _KINDS]
-    return _Grid(
+    return _sound(
+        path,
         np.asarray(whole.points, dtype=float),
         cells,
         int(whole.n_cells),
@@ -159,23 +184,38 @@ def _read_with_pyvista(path: Path) -> _Grid:
     )
 
 
-def _read_with_meshio(path: Path) -> _Grid:
+def _read_with_meshio(path: Path) -> Grid:
     import meshio
     from meshio import vtu  # meshio.read ends the program where it can't read
 
     try:
         mesh = vtu.read(path)
-    # the kinds of errors that it raises on codings that it doesn't know, and on broken bytes
-    except (meshio.ReadError, OSError, ElementTree.ParseError, ValueError, KeyError, AssertionError) as error:
+    except (meshio.ReadError, *DAMAGE) as error:
         raise _damage_error(
             path, f"{error or 'meshio does not know its coding'}", f"{INSTALL}, or export it again."
         ) from error
     kinds = [(block.type.rstrip("0123456789"), block.data) for block in mesh.cells]
     cell_data = {name: np.concatenate(values) for name, values in mesh.cell_data.items()}
     count = sum(len(block.data) for block in mesh.cells)
-    return _Grid(
-        np.asarray(mesh.points, dtype=float), kinds, count, mesh.point_data, cell_data, mesh.field_data
-    )
+    points = np.asarray(mesh.points, dtype=float)
+    return _sound(path, points, kinds, count, mesh.point_data, cell_data, mesh.field_data)
+
+
+def _sound(
+    path: Path,
+    points: np.ndarray,
+    cells: Sequence[tuple[str, np.ndarray]],
+    count: int,
+    *data: Mapping[str, Any],
+) -> Grid:
+    """Return the content of a file whose cells name nodes that are there; names of arrays are plain texts."""
+    for kind, nodes in cells:
+        if nodes.size and not (nodes.min() >= 0 and nodes.max() < len(points)):
+            raise _damage_error(path, f"a {kind} names a node that is not among its {len(points)}")
+    if points.ndim != 2 or not np.isfinite(points).all():
+        raise _damage_error(path, "coordinates of nodes are no finite numbers")
+    plain = [{plain_text(str(name)): np.array(values) for name, values in arrays.items()} for arrays in data]
+    return Grid(np.array(points), [(kind, np.array(nodes)) for kind, nodes in cells], count, *plain)
 
 
 def _damage_error(path: Path, why: str, fix: str = "") -> FileFormatError:
@@ -184,7 +224,7 @@ def _damage_error(path: Path, why: str, fix: str = "") -> FileFormatError:
     )
 
 
-def _collect(path: Path, grids: Sequence[_Grid], times: np.ndarray | None) -> Results:
+def _collect(path: Path, grids: Sequence[Grid], times: np.ndarray | None) -> Results:
     first = grids[0]
     columns = [] if times is None else [Column(TIME, times, None, "{time}")]
     notes: list[str] = []

@@ -24,6 +24,7 @@ from palpate import checks
 from palpate.errors import FileFormatError, UsageError
 from palpate.file_kinds import PART_FORMATS, part_ending, way_for
 from palpate.files import TemporaryFolder
+from palpate.input_files import read_input
 from palpate.physics.advice import advise
 from palpate.physics.shapes.naming import require_known, require_name
 from palpate.physics.shapes.packed_file import plain_file, read_part, require_counts, require_file
@@ -79,7 +80,7 @@ def named_files(path: str) -> tuple[Path, ...]:
         return tuple(tetgen_file(path, other) for other in TETGEN if other != ending)
     if ending not in _NAMED:
         return ()
-    names = dict.fromkeys(_NAMED[ending].findall(file.read_bytes()))
+    names = dict.fromkeys(_NAMED[ending].findall(read_input(file)))
     return tuple(file.parent / name.decode("utf-8", "replace").strip(' "') for name in names)
 
 
@@ -127,7 +128,7 @@ def digest_of(path: str) -> str:
     digest = hashlib.sha256(content)
     for other in named_files(path):
         if other.is_file():
-            digest.update(other.read_bytes())
+            digest.update(read_input(other))
     return digest.hexdigest()
 
 

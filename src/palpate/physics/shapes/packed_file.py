@@ -18,6 +18,7 @@ from pathlib import Path
 from palpate.errors import FileFormatError, UsageError
 from palpate.file_kinds import part_ending
 from palpate.files import TemporaryFolder
+from palpate.input_files import read_input
 from palpate.sizes import require_deflated
 
 __all__ = ["plain_file", "read_part", "require_counts", "require_file"]
@@ -82,7 +83,7 @@ def read_part(path: str | os.PathLike[str]) -> bytes:
         If it is packed and damaged.
     """
     require_file(path)
-    content = Path(path).read_bytes()
+    content = read_input(path)
     if Path(path).suffix.lower() != ".gz":
         return content
     why = "It is no gzip file." if not content.startswith(_GZIP) else "It is damaged or cut short."

@@ -5,11 +5,13 @@ from __future__ import annotations
 import html
 import json
 import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palpate.errors import UsageError
 from palpate.files import write_file
+from palpate.format import script_json
 from palpate.output_files import free_path, with_seal
 
 if TYPE_CHECKING:
@@ -41,10 +43,12 @@ def growth_html(growth: GrowthRecorder, name: str) -> str:
             why="No network was learnt with this recorder.",
             fix="Pass it to a learner first: learn(…, watch=recorder).",
         )
-    # a name that holds "</script" must not end the script
-    data = json.dumps(growth.describe(), separators=(",", ":")).replace("</", "<\\/")
-    page = TEMPLATE.read_text(encoding="utf-8")
-    return page.replace("{{name}}", html.escape(name)).replace("{{data}}", data)
+    words = {
+        "name": html.escape(name),
+        "data": script_json(json.dumps(growth.describe(), separators=(",", ":"))),
+    }
+    # in one pass: a name may hold braces, too
+    return re.sub(r"\{\{(name|data)\}\}", lambda m: words[m[1]], TEMPLATE.read_text(encoding="utf-8"))
 
 
 def write_growth_page(path: str | os.PathLike[str], growth: GrowthRecorder, name: str) -> Path:

@@ -4,13 +4,14 @@ import io
 import json
 import struct
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numcodecs import Blosc, Zstd
 
 from palpate.dataset import Dataset, Layout, assemble
-from palpate.errors import FileFormatError, ResourceError
+from palpate.errors import DataWarning, FileFormatError, ResourceError
 from palpate.learning.learning_history import History
 from palpate.network.packing import unpack
 from palpate.sizes import HEAD, promised_size, require_npz
@@ -19,9 +20,15 @@ from palpate.units import Range
 PROMISE = b"\x28\xb5\x2f\xfd\xa0" + struct.pack("<I", 2**32 - 1) + b"\0\0\0\0"
 
 
+CRC = bytes(4)  # where a chunk's checksum stands; sizes are looked at before it
+
+
 @pytest.fixture
 def store(tmp_path):
-    rows = 64
+    return make_store(tmp_path, 64)
+
+
+def make_store(tmp_path, rows):
     scalars = ("strain_energy", "potential_energy", "iterations", "residual", "solve_seconds")
     answers = {name: np.linspace(0.0, 1.0, rows) for name in scalars}
     answers |= {"displacement": np.ones((rows, 1, 3)), "root_reaction": np.ones((rows, 3))}
@@ -58,14 +65,79 @@ def test_the_promise_of_an_honest_chunk_is_its_size(codec, length):
 @pytest.mark.parametrize("name", ["displacement", "message", "sample"])
 def test_thirteen_bytes_that_promise_four_gigabytes_are_refused(store, name):
     (chunk,) = (file for file in (store / name / "c").rglob("*") if file.is_file())
-    chunk.write_bytes(PROMISE)
+    chunk.write_bytes(PROMISE + CRC)
     assert len(PROMISE) == 13
     assert "13 bytes promise 4,294,967,295" in refusal(store)
     assert f"{name}, chunk c/" in refusal(store)
 
 
+def test_thirteen_bytes_that_promise_millions_of_texts_are_refused(store):
+    """They decode to four bytes, the number of texts, for all of which the decoder would make room."""
+    (chunk,) = (file for file in (store / "message" / "c").rglob("*") if file.is_file())
+    content = bytes(Zstd().encode(struct.pack("<I", 300_000_000)))
+    assert len(content) == 13
+    chunk.write_bytes(content + struct.pack("<I", crc32c(content)))
+    assert "it promises 300,000,000 texts where 64 belong" in refusal(store)
+
+
+def crc32c(content):
+    """Return Castagnoli's cyclic redundancy check (RFC 3720, appendix B.4), bit by bit."""
+    value = 0xFFFFFFFF
+    for byte in content:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ 0x82F63B78 * (value & 1)
+    return value ^ 0xFFFFFFFF
+
+
+def flip(file):
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 4
+    file.write_bytes(content)
+
+
+DAMAGES = [
+    flip,
+    Path.unlink,
+    lambda file: file.write_bytes(b""),
+    lambda file: file.write_bytes(PROMISE + CRC),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [*(("displacement", damage) for damage in DAMAGES), *((name, flip) for name in ("inputs", "message"))],
+)
+def test_a_damaged_chunk_costs_its_rows(tmp_path, name, damage):
+    whole = make_store(tmp_path, 640)
+    kept = Dataset.open(whole)
+    damage(sorted(file for file in (whole / name / "c").rglob("*") if file.is_file())[2])
+    with pytest.warns(DataWarning, match="80 of 640 rows of .* are damaged") as told:
+        data = Dataset.open(whole)
+    assert f"{name}, chunk c/2" in str(told[0].message)
+    rows = np.delete(np.arange(640), slice(160, 240))
+    np.testing.assert_array_equal(data["sample"], rows)
+    assert data.hash == kept.take(rows).hash
+
+
+@pytest.mark.parametrize("name", ["sample", "rest", "input_low"])
+def test_damage_beside_the_rows_is_refused(tmp_path, name):
+    whole = make_store(tmp_path, 640)
+    (chunk,) = (file for file in (whole / name / "c").rglob("*") if file.is_file())
+    flip(chunk)
+    assert "corrupt" in refusal(whole)
+
+
+def test_damaged_rows_excuse_no_other_change(tmp_path):
+    whole = make_store(tmp_path, 640)
+    flip(whole / "inputs" / "c" / "1" / "0")
+    file = whole / "zarr.json"
+    file.write_text(file.read_text().replace('\\"problem\\"', '\\"Problem\\"'))
+    assert "its contents don't match its checksum" in refusal(whole)
+
+
 def test_a_chunk_of_another_size_than_its_array_is_refused(store):
-    (store / "inputs" / "c" / "0" / "0").write_bytes(Zstd().encode(bytes(80_000)))
+    (store / "inputs" / "c" / "0" / "0").write_bytes(Zstd().encode(bytes(80_000)) + CRC)
     assert "80,000 bytes where 512 belong" in refusal(store)
 
 

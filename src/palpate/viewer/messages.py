@@ -452,7 +452,7 @@ class Reason(Json):
 
 @dataclass(frozen=True)
 class Feel(Json):
-    """What may be felt wrongly on the device, such as a body too stiff for its rate and delay, server to page.
+    """Cautions about what is felt on the device, such as of a body too stiff for its rate and delay, server to page.
 
     Attributes
     ----------

@@ -125,7 +125,7 @@ export interface Reason {
   ago: number;
 }
 
-/** A body that is too stiff for the device, the rate and the delay, server to page. */
+/** Cautions about what is felt on the device, such as of a body too stiff for its rate and delay, server to page. */
 export interface Feel {
   body: number;
   limit: number;

@@ -79,6 +79,8 @@ def _read_scene(path: str, content: bytes, kind: str) -> list[tuple[str, np.ndar
     for name, matrix, key in parts:
         mesh = scene.geometry[key]
         if isinstance(mesh, Trimesh) and len(mesh.faces):
+            if np.shape(mesh.vertices)[1:] != (3,):
+                raise _damaged(path, kind, "A vertex has not three coordinates")
             points = np.asarray(mesh.vertices, dtype=float) @ matrix[:3, :3].T + matrix[:3, 3]
             turned = np.linalg.det(matrix[:3, :3]) < 0
             meshes.append((str(name), points, np.asarray(mesh.faces)[:, ::-1] if turned else mesh.faces))

@@ -79,13 +79,10 @@ HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised de
 _SHORTEST_RAMP = 0.050  # s
 _WARMING = 10.0  # s over which motors average the force; windings take longer, which is on the safe side
 _WARM = 0.8  # share of the continuous force's square from which on the limit comes down
-_DOUBTS, _DOUBTFUL = (
-    3,
-    0.015,
-)  # count of impossible samples, and time of them, s, from which on they are a fault
-_LEAK = (
-    0.1  # of the count, for each believed sample: a line that spoils more than one sample in ten is broken
-)
+# count of impossible samples, and time of them, s, from which on they are a fault
+_DOUBTS, _DOUBTFUL = 3, 0.015
+# taken off the count for each believed sample: a line that spoils more than one sample in ten is broken
+_LEAK = 0.1
 _ACCELERATION = 150.0  # m/s²: fast hands stay below 100, and 12 N on a bare handle of 0.1 kg make 120
 _NOISE = 3e-4  # m rms along each axis that every sensor is granted: several times that of any that is sold
 _OUTLIER = 4.5  # times the rms along each axis: of the three axes together one in ten thousand is larger

@@ -70,24 +70,12 @@ _ROUNDING = 0.01  # of the size of an orientation
 
 
 class CrtkDevice:
-    """One arm behind the bridge.
+    """One arm behind the bridge; its traits have the radius and force of the settings and the measured delay.
 
-    Attributes
-    ----------
-    traits : Traits
-        With the radius and force of the settings and the measured delay.
-    types : {"ros1", "ros2"}
-        Spelling of types in use.
-    round_trip : float
-        Measured through the bridge, s.
-    repeated : int
-        Positions whose stamp was not newer than the last one's.
-    published : int
-        Wrenches sent.
-    operating : str
-        State that the arm reports.
-    locked : bool or None
-        Whether the arm says that it holds its orientation; None where it says nothing.
+    `types` is the spelling of types in use, "ros1" or "ros2"; `round_trip` the time measured through the bridge, s;
+    `repeated` counts positions whose stamp was not newer than the last one's, `published` the wrenches sent;
+    `operating` is the state that the arm reports; `locked` says whether it holds its orientation, None where it says
+    nothing.
     """
 
     traits: ClassVar[Traits] = Traits(

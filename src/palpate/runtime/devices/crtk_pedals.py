@@ -18,7 +18,7 @@ from palpate.runtime.devices.device import Sample
 __all__ = ["PEDALS", "Pedals"]
 
 PEDALS = ("clutch", "coag", "bicoag", "camera", "cam_minus", "cam_plus")
-_PRESSED, _TAPPED = 1, 2
+_PRESSED, _TAPPED = 1, 2  # what a pedal's message says; 0: let go
 
 
 class Pedals:

@@ -33,7 +33,7 @@ _SYN, _KEY, _ABS, _FF = 0, 1, 3, 0x15
 _DROPPED, _REPORT = 3, 0  # of _SYN: events were lost; a set of events is complete
 _X, _Y, _Z, _RX, _RY, _RZ, _GAS, _BRAKE = 0, 1, 2, 3, 4, 5, 9, 10
 _SOUTH, _EAST, _START, _LEFT_STICK = 0x130, 0x131, 0x13B, 0x13D
-_RUMBLE, _FULL = 0x50, 0xFFFF
+_RUMBLE, _FULL = 0x50, 0xFFFF  # kind of effect, and its largest magnitude
 
 _MOST_EVENTS = 256  # in one tick: more than any pad sends
 _RENEWED, _LASTING = 0.050, 100  # s between rumble effects, ms that each lasts

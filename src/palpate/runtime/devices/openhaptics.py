@@ -52,8 +52,8 @@ AXES = PLAIN_AXES
 _MODELS = {"touch x": "desktop", "touchx": "desktop", "desktop": "desktop", "omni": "omni", "touch": "touch"}
 _DAMPING, _MASS = 0.5, 0.045  # N·s/m, assumed; kg, apparent at the tip of a Touch (3D Systems' data sheet)
 _PRIORITY = 0xFFFF  # of the callback, the highest
-_START, _FASTEST = 2.0, 1.0  # s that the frames of the start may take, m/s
-_MARGIN, _UNSTATED_REACH = 0.02, 0.4  # m around the largest workspace; m where none is stated
+_START, _FASTEST = 2.0, 1.0  # s that the frames of the start may take; faster is an error, m/s
+_MARGIN, _UNSTATED_REACH = 0.02, 0.4  # m around the largest workspace; m of reach where none is stated
 # s of zero force after an error, at first and at most: doubled where an error comes again within _AGAIN, s
 _PAUSE, _LONGEST_PAUSE, _AGAIN = 0.1, 5.0, 10.0
 _GOODBYE = 0.1  # s for the last frame

@@ -28,12 +28,12 @@ __all__ = ["SimulatedHand", "SimulatedSettings"]
 
 _SHAPES = ("sine", "press", "random", "adversarial")
 _RECORDED = len(_SHAPES)
-_STEP = 1e-4  # s
+_STEP = 1e-4  # s, of the motion's integration
 _PAST = 512  # samples kept for the delay
 # s: staler input counts as stalled; a longer pause isn't simulated
 _LONGEST_DELAY, _LONGEST_STRETCH = 0.015, 0.1
 _WAVES = 6  # of the random script: tremor has 8 to 12 Hz, voluntary motion ends near 6
-_SLOWEST, _FASTEST = 0.2, 8.0  # Hz
+_SLOWEST, _FASTEST = 0.2, 8.0  # Hz, of the random script's waves
 _RISE = 0.2  # s, of a press
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")

@@ -56,7 +56,8 @@ _ADDED, _REMOVED = 0, 1  # second integers of _DEVICE
 _TAG = 0x7FAA0000  # in the first integer of requests and answers
 _SENSITIVITY, _NAME, _BUTTONS, _PROTOCOL = 0x1002, 0x2000, 0x2003, 0x5500
 _TEXT = 24  # bytes of a name in one packet
-_ANSWER, _ASKED, _PATIENCE = 0.3, 0.1, 0.35  # s
+# s to wait for an answer, between two questions that show whether the daemon lives, and of silence until it is a fault
+_ANSWER, _ASKED, _PATIENCE = 0.3, 0.1, 0.35
 _CHUNK, _MOST_CHUNKS = 8192, 4  # bytes; in one tick: more than a daemon sends
 _FEWEST_BUTTONS = 2  # that any puck has
 

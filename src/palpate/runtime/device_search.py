@@ -380,7 +380,7 @@ HARDWARE: tuple[_Search, ...] = (
 def load_library(device: str, file: str = "", surroundings: Surroundings | None = None) -> ctypes.CDLL:
     """Load the vendor's library of a driver, as the driver does when it is opened; an empty `file` looks for it.
 
-    By default `surroundings` is this machine.     A DeviceError names the files, folders and variables that were tried.
+    By default `surroundings` is this machine. A DeviceError names the files, folders and variables that were tried.
     """
     surroundings = surroundings or Surroundings()
     entry = next(e for e in HARDWARE if isinstance(e, LibrarySearch) and e.device == device)

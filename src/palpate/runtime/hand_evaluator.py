@@ -42,7 +42,6 @@ class Elastic(Protocol):
     force: np.ndarray  # (3,), N, on the hand
     stiffness: np.ndarray  # (3, 3), ∂F/∂x, N/m; zero where it isn't known
     inside: bool  # whether the answer is of the trained region
-
     slope: np.ndarray  # (3,), ∇q, √J/m
 
     @property

@@ -17,7 +17,7 @@ from palpate.errors import DeviceError, DeviceLostError, UsageError
 
 __all__ = ["WebsocketChannel"]
 
-_OPENING, _GOODBYE = 2.0, 0.2  # s to wait for an opening connection, and for the other end's farewell
+_OPENING, _GOODBYE = 2.0, 0.2  # s to wait for an opening connection, and for the other end to read all
 _BUDGET = 2.5e-4  # s, a quarter of a tick, for what has come: the rest is left to the next call
 _MOST_MESSAGES = 16  # to a call, for the same reason: their reader takes time for each
 _CHUNK = 4096  # bytes

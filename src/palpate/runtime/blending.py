@@ -26,22 +26,11 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 class Blend:
-    """Answers a hand as `HandEvaluator` does, by two of them; nothing is allocated.
+    """Answers a hand as `HandEvaluator` does, by an old one and a new one that took over from it; nothing is allocated.
 
     Its attributes are those of `HandEvaluator`; what can't be mixed is that of the surrogate with the larger share.
-
-    Attributes
-    ----------
-    share : float
-        b, the new surrogate's.
-    shift : (3,)
-        By how much the place of the new one lies beside that of the old, m: where nobody holds a body that lies
-        elsewhere after a touch, each lies in its own place.
-
-    Parameters
-    ----------
-    old, new : HandEvaluator
-        The new one has taken over from the old.
+    `share` is b, the new surrogate's. `shift` (3,), m, is by how much the place of the new one lies beside that of the
+    old: where nobody holds a body that lies elsewhere after a touch, each lies in its own place.
     """
 
     def __init__(self, old: HandEvaluator, new: HandEvaluator) -> None:

@@ -38,30 +38,16 @@ from palpate.errors import UsageError
 __all__ = ["Coupling", "coupling_stiffness"]
 
 STEPS = 3  # Newton steps a tick on a body without memory
-_BALANCED, _UNFELT = 1e-3, 1e-3  # share of the force, and N: no hand feels less
+# what may be left of the balance, as a share of the force, and in N: no hand feels less
+_BALANCED, _UNFELT = 1e-3, 1e-3
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 def coupling_stiffness(stiffness: float, bound: float) -> float:
-    """Return the spring k, N/m, that makes a body feel at most as stiff as a bound.
+    """Return the spring k = L K/(K − L), N/m, that makes a body of stiffness K feel at most as stiff as `bound`, L.
 
-    Parameters
-    ----------
-    stiffness : float
-        The body's largest, K, N/m.
-    bound : float
-        The largest that the hand may feel, L, N/m.
-
-    Returns
-    -------
-    float
-        k = L K/(K − L); infinite, no spring, where K ≤ L.
-
-    Raises
-    ------
-    UsageError
-        If a body is to feel as stiff as nothing.
+    It is infinite, no spring, where K ≤ L.
     """
     if stiffness <= bound:
         return math.inf
@@ -75,18 +61,11 @@ def coupling_stiffness(stiffness: float, bound: float) -> float:
 
 
 class Coupling:
-    """The spring and its proxy, in the body's metres.
+    """The spring of `stiffness` k, N/m, and its proxy, in the body's metres.
 
-    Attributes
-    ----------
-    stiffness : float
-        k, N/m; infinite where the hand touches the body itself. Set it by `change`.
-    hardest : float
-        The body's largest stiffness, N/m, for steps where its own isn't known.
-    proxy : (3,)
-        Where the body is touched, m.
-    force : (3,)
-        On the hand, N.
+    An infinite `stiffness`, set by `change`, means that the hand touches the body itself. `hardest` is the body's
+    largest, N/m, for steps where its own isn't known; `proxy` (3,), m, is where the body is touched, `force` (3,), N,
+    that on the hand.
     """
 
     def __init__(self, stiffness: float = math.inf, hardest: float = math.inf) -> None:
@@ -119,30 +98,19 @@ class Coupling:
         self.force[:] = 0.0
 
     def take_up(self, hand: np.ndarray, force: np.ndarray) -> None:
-        """Put a spring in front of a body that was touched without one: it pulls as the body did.
+        """Put a spring in front of a body that was touched without one; it pulls as the body did.
 
-        Parameters
-        ----------
-        hand : (3,)
-            x, m.
-        force : (3,)
-            Of the body on the hand there, N.
+        `hand` is x (3,), m, `force` (3,), N, that of the body on the hand there.
         """
         self._rested = not force.any()
         self.force[:] = force
         self.proxy[:] = hand + force / self.stiffness
 
     def follow(self, hand: np.ndarray, force: np.ndarray, tangent: np.ndarray) -> None:
-        """Move the proxy by one Newton step; the first after `reset` leads to the hand.
+        """Move the proxy by one Newton step towards the hand x (3,), m; the first after `reset` leads to the hand.
 
-        Parameters
-        ----------
-        hand : (3,)
-            x, m.
-        force : (3,)
-            Of the body at the proxy as it was, N.
-        tangent : (3, 3)
-            ∂F/∂p there, N/m; zero where it isn't known.
+        `force` (3,), N, is that of the body at the proxy as it was, `tangent` (3, 3) is ∂F/∂p there, N/m; zero where it
+        isn't known.
         """
         if self._rested:
             self._rested = False

@@ -31,13 +31,7 @@ _LIMIT = 120.0  # s for the compiler
 
 
 def c_compiler() -> str:
-    """Return the path of the system's C compiler: that of the variable ``CC``, else cc, gcc or clang.
-
-    Raises
-    ------
-    ResourceError
-        If there is none.
-    """
+    """Return the path of the system's C compiler: that of the variable ``CC``, else cc, gcc or clang."""
     for name in (os.environ.get("CC", ""), *_COMPILERS):
         if name and (path := shutil.which(name)):
             return path
@@ -49,23 +43,10 @@ def c_compiler() -> str:
 
 
 def compile_double(device: str, folder: Path, definitions: Mapping[str, float] | None = None) -> Path:
-    """Compile the double of a device's library and return its file.
+    """Compile the double of a device's library into a folder, made if it doesn't exist, and return its file.
 
-    Parameters
-    ----------
-    device : str
-        Name of the driver, as in ``--device``.
-    folder : Path
-        Where the library is put; made if it doesn't exist.
-    definitions : mapping of str to float, optional
-        Numbers that the source takes at compile time, such as the stroke of its hand.
-
-    Raises
-    ------
-    UsageError
-        If there is no double of that device.
-    ResourceError
-        If there is no compiler, or it fails.
+    The device is a driver's name as in ``--device``; `definitions` are numbers that the source takes at compile time,
+    such as the stroke of its hand. A ResourceError says that there is no compiler, or that it failed.
     """
     if device not in DOUBLES:
         raise UsageError(

@@ -62,30 +62,14 @@ def _is_installed(package: str) -> bool:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The machine that is searched; a test lays out one of its own.
+    """The machine that is searched; a test lays out one of its own."""
 
-    Attributes
-    ----------
-    root : Path
-        Folder below which absolute paths are looked up.
-    environment : mapping of str to str
-        Environment variables.
-    platform : str
-        ``linux``, ``darwin`` or ``win32``.
-    answers : callable
-        Returns whether something listens on a host's port.
-    installed : callable
-        Returns whether a package of Python is there, by its name.
-    listens : callable
-        Returns whether something listens at a Unix socket.
-    """
-
-    root: Path = Path("/")
+    root: Path = Path("/")  # folder below which absolute paths are looked up
     environment: Mapping[str, str] = field(default_factory=lambda: os.environ)
-    platform: str = sys.platform
-    answers: Callable[[str, int], bool] = _port_answers
-    installed: Callable[[str], bool] = _is_installed
-    listens: Callable[[Path], bool] = _socket_answers
+    platform: str = sys.platform  # linux, darwin or win32
+    answers: Callable[[str, int], bool] = _port_answers  # does something listen on a host's port
+    installed: Callable[[str], bool] = _is_installed  # is a package of Python there, by its name
+    listens: Callable[[Path], bool] = _socket_answers  # does something listen at a Unix socket
 
     def place(self, path: str) -> Path:
         """Return where an absolute path lies below the root."""
@@ -103,38 +87,17 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class Finding:
-    """One kind of device: what there is of it.
+    """One kind of device: what there is of it."""
 
-    Attributes
-    ----------
-    name : str
-        Of the device, or of the family of devices.
-    kind : {"built in", "library", "service", "gamepad"}
-        What it is reached through.
-    state : {"ready", "present", "absent"}
-        Ready for ``--device``; there, without a driver in this version; or not there.
-    detail : str
-        What was found.
-    looked_for : tuple of str
-        Names of the files or ports.
-    looked_in : tuple of str
-        Folders, variables of the environment or hosts.
-    remedy : str
-        What to do; empty where it is ready.
-    device : str
-        Name for ``--device``; empty where this version has no driver.
-    facts : tuple of str
-        What its driver knows of such devices: limits by type, buttons, and whether it was tried on hardware.
-    """
-
-    name: str
-    kind: str
-    state: str
-    detail: str
-    looked_for: tuple[str, ...] = ()
-    looked_in: tuple[str, ...] = ()
-    remedy: str = ""
-    device: str = ""
+    name: str  # of the device, or of the family of devices
+    kind: str  # what it is reached through: built in, library, service or gamepad
+    state: str  # ready for --device; present, without a driver in this version; or absent
+    detail: str  # what was found
+    looked_for: tuple[str, ...] = ()  # names of the files or ports
+    looked_in: tuple[str, ...] = ()  # folders, variables of the environment or hosts
+    remedy: str = ""  # what to do; empty where it is ready
+    device: str = ""  # name for --device; empty where this version has no driver
+    # what its driver knows of such devices: limits by type, buttons, whether it was tried on hardware
     facts: tuple[str, ...] = ()
 
 
@@ -203,31 +166,17 @@ def _advice(state: str, driven: str, to_install: str) -> str:
 
 @dataclass(frozen=True)
 class LibrarySearch:
-    """A vendor's shared library, by its file name.
+    """A vendor's shared library, by its file name."""
 
-    Attributes
-    ----------
-    name, device : str
-        Of the family of devices, and of its driver.
-    files : mapping of str to tuple of str
-        File names by platform, the preferred one first.
-    folders : tuple of str
-        Where the vendor's installer puts it, beside the system's own folders; may hold wildcards.
-    variables : tuple of str
-        Environment variables that name a folder of the vendor's kit; its subfolders ``lib*`` are looked in.
-    override : str
-        Environment variable that names the file itself, or its folder.
-    download : str
-        Title of what the vendor offers.
-    """
-
-    name: str
-    device: str
-    files: Mapping[str, tuple[str, ...]]
+    name: str  # of the family of devices
+    device: str  # name of the driver
+    files: Mapping[str, tuple[str, ...]]  # file names by platform, the preferred one first
+    # where the vendor's installer puts it, beside the system's own; may hold wildcards
     folders: tuple[str, ...]
+    # environment variables that name a folder of the vendor's kit; its lib* are looked in
     variables: tuple[str, ...]
-    override: str
-    download: str
+    override: str  # environment variable that names the file itself, or its folder
+    download: str  # title of what the vendor offers
 
     def look(self, surroundings: Surroundings) -> Finding:
         """Return the finding on this machine."""
@@ -282,22 +231,12 @@ _SYSTEM = {
 
 @dataclass(frozen=True)
 class ServiceSearch:
-    """A program on this machine that owns the devices, by the ports that it listens on.
+    """A program on this machine that owns the devices, by the ports that it listens on."""
 
-    Attributes
-    ----------
-    name, device : str
-        Of the family of devices, and of its driver.
-    ports : mapping of int to str
-        Each port, and what speaks there.
-    install : str
-        What to install or start, as a sentence.
-    """
-
-    name: str
-    device: str
-    ports: Mapping[int, str]
-    install: str
+    name: str  # of the family of devices
+    device: str  # name of the driver
+    ports: Mapping[int, str]  # each port, and what speaks there
+    install: str  # what to install or start, as a sentence
 
     def look(self, surroundings: Surroundings) -> Finding:
         """Return the finding on this machine; a connection is made and closed at once, and nothing is sent."""
@@ -439,21 +378,9 @@ HARDWARE: tuple[_Search, ...] = (
 
 
 def load_library(device: str, file: str = "", surroundings: Surroundings | None = None) -> ctypes.CDLL:
-    """Load the vendor's library of a device, as its driver does when it is opened.
+    """Load the vendor's library of a driver, as the driver does when it is opened; an empty `file` looks for it.
 
-    Parameters
-    ----------
-    device : str
-        Name of the driver, as in ``--device``.
-    file : str
-        The library's file; empty looks for it.
-    surroundings : Surroundings, optional
-        The machine that is searched; by default this one.
-
-    Raises
-    ------
-    DeviceError
-        If the library is not there or can't be loaded, with the names, folders and variables that were tried.
+    By default `surroundings` is this machine. A DeviceError names the files, folders and variables that were tried.
     """
     surroundings = surroundings or Surroundings()
     entry = next(e for e in HARDWARE if isinstance(e, LibrarySearch) and e.device == device)

@@ -80,18 +80,7 @@ _LONGEST = 20.0  # s of the injector's clock for a touch to begin, or a force to
 
 
 class FaultyDevice:
-    """A simulated hand whose driver can be made to fail, on a device with a watchdog.
-
-    Attributes
-    ----------
-    fault : str
-        The kind of `FAULTS` that is on; empty for none.
-
-    Parameters
-    ----------
-    hand : SimulatedHand
-        Moves, and is pushed.
-    """
+    """A simulated hand whose driver can be made to fail by a `fault` of `FAULTS`, on a device with a watchdog."""
 
     def __init__(self, hand: SimulatedHand) -> None:
         self.hand, self.fault, self._turned = hand, "", False
@@ -209,30 +198,14 @@ def with_switch(body: Touchable) -> tuple[Touchable, _Switch]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one fault.
+    """The outcome of one fault."""
 
-    Attributes
-    ----------
-    kind : str
-        Of `FAULTS`.
-    silence : float
-        From the onset until the device exerts no force, s.
-    recorded : bool
-        Whether the fault was counted, with its time.
-    withheld : bool
-        Whether the force stayed away until the body held no energy, and began there from zero.
-    back : float
-        From the end of the fault until the hand felt the body again, s; infinite where it never did.
-    restarted : bool
-        Whether that took a new loop.
-    """
-
-    kind: str
-    silence: float
-    recorded: bool
-    withheld: bool
-    back: float
-    restarted: bool = False
+    kind: str  # of `FAULTS`
+    silence: float  # s from the onset until the device exerts no force
+    recorded: bool  # the fault was counted, with its time
+    withheld: bool  # the force stayed away until the body held no energy, and began there from zero
+    back: float  # s from the end of the fault until the hand felt the body again; infinite where it never did
+    restarted: bool = False  # that took a new loop
 
     @property
     def good(self) -> bool:
@@ -244,21 +217,9 @@ class Outcome:
 class FaultInjector:
     """A hand that presses a body again and again, and faults in the midst of it.
 
-    Parameters
-    ----------
-    body : Touchable
-        The body that is touched.
-    rate : float
-        Ticks per second, Hz.
-    seed : int
-        Of the moments, durations and sizes of the faults.
-    settings : SimulatedSettings, optional
-        Of the hand; by default it presses the body once a second, to three quarters of its trained depth.
-
-    Attributes
-    ----------
-    now : float
-        Time of the injector's clock, s.
+    The loop ticks at `rate`, Hz; `now` is the time of the injector's clock, s. The seed is that of the moments,
+    durations and sizes of the faults. By default the hand presses the body once a second, to three quarters of its
+    trained depth.
     """
 
     def __init__(
@@ -295,13 +256,7 @@ class FaultInjector:
         )
 
     def inject(self, kind: str) -> Outcome:
-        """Wait for a touch, inject one fault, and wait until the hand feels the body again.
-
-        Raises
-        ------
-        UsageError
-            If there is no such kind of fault, or the hand doesn't reach the body.
-        """
+        """Wait for a touch, inject one fault, and wait until the hand feels the body again."""
         if kind not in FAULTS:
             raise UsageError(
                 f"There is no fault {kind!r} to inject.", fix=f"Choose one of {', '.join(FAULTS)}."

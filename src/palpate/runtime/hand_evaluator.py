@@ -37,25 +37,12 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 class Elastic(Protocol):
-    """The elastic answer that `HandEvaluator` asks for, such as `palpate.surrogates.SurrogateEvaluator`.
+    """The elastic answer that `HandEvaluator` asks for, such as `palpate.surrogates.SurrogateEvaluator`."""
 
-    Attributes
-    ----------
-    force : (3,)
-        On the hand, N.
-    stiffness : (3, 3)
-        ∂F/∂x, N/m; zero where it isn't known.
-    inside : bool
-        Whether the answer is of the trained region.
-    slope : (3,)
-        ∇q, √J/m.
-    """
-
-    force: np.ndarray
-    stiffness: np.ndarray
-    inside: bool
-
-    slope: np.ndarray
+    force: np.ndarray  # (3,), N, on the hand
+    stiffness: np.ndarray  # (3, 3), ∂F/∂x, N/m; zero where it isn't known
+    inside: bool  # whether the answer is of the trained region
+    slope: np.ndarray  # (3,), ∇q, √J/m
 
     @property
     def energy(self) -> float:
@@ -93,57 +80,26 @@ class Model(Protocol):
 class HandEvaluator:
     """Answers a hand on any body; nothing is allocated.
 
-    Attributes
-    ----------
-    force : (3,)
-        On the hand, N.
-    contact : (3,)
-        The probe's centre, or the offset of the held place from its rest position, m.
-    loads : (n,)
-        The inputs of the field at its nodes there, such as the loads that hold the body, N; otherwise none.
-    inside : bool
-        Within the trained region.
-    let_go : bool
-        Whether the body has let go of a probe that is still in it.
-    waiting : bool
-        Whether the body was released and waits for a hand that is where it holds no energy.
-    rest_zone : float
-        How deep a probe, or how far from rest what is held, may be for that, m.
-    depth : float
-        Of the rigid probe in the surface at rest, m; negative without contact, zero for a probe that was let go or that
-        a released body waits for. Of a held body, how far the hand has displaced it.
-    stiffness : float
-        Along the force, −F·(∂F/∂x)F/‖F‖², N/m, of the elastic answer; zero without force, or where it isn't known.
-    elapsed : float
-        Since the call before, s, to be set ahead of each call where the body has a memory.
-    away : (3,)
-        Where a probe or a patch is that nobody holds, m.
-    indentation : (n,)
-        Amplitude of the print at each place that keeps one, √J; empty for a body that keeps none.
+    The hand moves a free probe, or, where it `holds`, a patch or a node, whose place the `node` tells of a body drawn
+    by its nodes. A `memory` has ``force`` and ``step(position, amplitude, slope, dt)`` as
+    `palpate.surrogates.memories.MemoryState` has them; one with ``release(dt)`` moves the rest of what nobody holds,
+    and needs a single felt direction; one with ``now`` keeps indentations. `directions` (k, 3) are those that are felt,
+    unit vectors, x, y and z unless given; `normal` (3,) is the outer normal of the surface where a probe usually
+    touches; `inner` is how far inside it the probe's centre may go, m, infinite for a body that never lets go; `radius`
+    is the probe's, m, unless it is the further input of number `radius_input`; `places` are those further inputs that a
+    hand which holds can't change: they say where it has taken hold.
 
-    Parameters
-    ----------
-    elastic : Elastic
-        The answer of the body without a memory.
-    memory : optional
-        With ``force`` and ``step(position, amplitude, slope, dt)`` as `palpate.surrogates.memories.MemoryState` has
-        them. One with ``release(dt)`` moves the rest of what nobody holds; one with ``now`` keeps indentations.
-    holds : bool
-        Whether the hand holds a patch or a node, and doesn't move a free probe.
-    directions : (k, 3)
-        The felt directions, unit vectors; x, y and z unless given. A memory that moves the rest needs a single one.
-    away, normal : (3,)
-        See above; outer normal of the surface where a probe usually touches.
-    inner : float
-        How far inside the surface the probe's centre may go, m; infinite for a body that never lets go.
-    radius : float
-        Of the probe, m, unless it is among the further inputs.
-    radius_input : int, optional
-        Which of the further inputs is the probe's radius.
-    node : NodeEvaluator, optional
-        Of a body drawn by its nodes: tells where the held node is.
-    places : tuple of int
-        Further inputs that a hand which holds can't change: those that say where it has taken hold.
+    Its answer: `force` (3,), N, on the hand; `contact` (3,), m, the probe's centre or the offset of the held place from
+    its rest; `loads` (n,), the inputs of the field at its nodes there, such as loads, N; `inside` the trained region or
+    not; `let_go` where the body has let go of a probe that is still in it; `stiffness`, −F·(∂F/∂x)F/‖F‖², N/m, along
+    the force of the elastic answer, zero without force or where it isn't known; `depth`, m, of the rigid probe in the
+    surface at rest, negative without contact and zero for a probe that was let go or that a released body waits for, or
+    how far the hand has displaced a held body; `indentation` (n,), √J, the amplitude of the print at each place that
+    keeps one.
+
+    To be set: `elapsed`, s since the call before, ahead of each call where the body has a memory; `away` (3,), m, where
+    a probe or a patch is that nobody holds; `waiting`, that the body was released and waits for a hand that is where it
+    holds no energy, and `rest_zone`, m, how deep a probe or how far from rest what is held may be for that.
     """
 
     def __init__(
@@ -187,17 +143,10 @@ class HandEvaluator:
         _project(self._place, self._onto, self._place.copy())
 
     def place(self, position: np.ndarray, *, holding: bool, believed: bool) -> None:
-        """Turn the hand's place (3,), m, into that of the probe or of what it holds.
+        """Turn the hand's place (3,), m, in place into that of the probe or of what it holds.
 
-        Parameters
-        ----------
-        position : (3,)
-            Overwritten.
-        holding : bool
-            Whether there is a hand. A probe that nobody holds is kept `away`: a way back to the centre could lead
-            through the body.
-        believed : bool
-            Whether the hand's place is good; one that isn't is answered by no force.
+        A probe that nobody holds is kept `away`: a way back to the centre could lead through the body. A place that is
+        not `believed` is answered by no force.
         """
         stays, took = self._stays, self._held
         self._held = holding and believed
@@ -249,12 +198,7 @@ class HandEvaluator:
     def take_over(self, other: HandEvaluator, carry: Carry | None = None) -> None:
         """Go on where the evaluator of another surrogate of the same body is: in the same hand, and with its memory.
 
-        Parameters
-        ----------
-        other : HandEvaluator
-            Which answered until now.
-        carry : callable, optional
-            Hands its memory on, see `palpate.surrogates.memories.Memory.carry_from`.
+        `carry` hands that memory on, see `palpate.surrogates.memories.Memory.carry_from`.
         """
         self.let_go, self.waiting, self.rest_zone = other.let_go, other.waiting, other.rest_zone
         self._held, self._taken = other._held, other._taken.copy()

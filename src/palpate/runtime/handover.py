@@ -24,7 +24,8 @@ from palpate.surrogates import NodeField
 __all__ = ["hand_over", "prepared", "take"]
 
 _MAGIC = b"palpate handover 1\n"
-_HEAD, _LINE, _PAGE = 64, 64, 4096  # bytes: before the sizes, alignment of arrays, and of memory
+# bytes: before the sizes, alignment of the arrays, and that of memory
+_HEAD, _LINE, _PAGE = 64, 64, 4096
 _SIZE = struct.Struct("<q")
 _AT_ONCE = 32  # pages that are touched in one piece
 
@@ -39,13 +40,7 @@ def prepared(body: Touchable) -> Touchable:
 
 
 def hand_over(body: Touchable) -> str:
-    """Leave a body in shared memory and return the name, for `take` in another process; who took it removes it.
-
-    Raises
-    ------
-    DeviceError
-        If the system gives no shared memory.
-    """
+    """Leave a body in shared memory and return the name, for `take` in another process; who took it removes it."""
     buffers: list[pickle.PickleBuffer] = []
     data = pickle.dumps(body, protocol=5, buffer_callback=buffers.append)
     parts = [memoryview(data), *(buffer.raw() for buffer in buffers)]
@@ -71,13 +66,7 @@ def hand_over(body: Touchable) -> str:
 
 
 def take(name: str) -> Touchable:
-    """Return the body that another process has left, its arrays where they lie, and remove the name.
-
-    Raises
-    ------
-    DeviceError
-        If there is none of that name.
-    """
+    """Return the body that another process has left, its arrays where they lie, and remove the name."""
     try:
         memory = shared_memory.attach(name, _MAGIC)
     except (OSError, ValueError) as error:

@@ -56,45 +56,16 @@ _DELAY_CHANGE = 0.02  # of T/2 + d: smaller changes move no bound that matters
 
 
 class Loop:
-    """The real-time loop around one device and one learnt body.
+    """The real-time loop around one device, which it closes at its end, and one learnt body.
 
-    Parameters
-    ----------
-    model : Model
-        The learnt body that answers.
-    device : Device
-        Where the hand is; the loop closes it at its end.
-    shared : Shared
-        State out, commands in.
-    workspace : Workspace
-        How hand metres become body metres.
-    limits : Limits
-        Largest force and its rate of change.
-    rate : float
-        Ticks per second, 10 to 10,000 Hz.
-    stiffness : float
-        The body's largest, N/m in its own metres; 0 where it isn't known: such a body is never softened.
-    override : bool
-        Whether a body that is too stiff for its device shall feel so all the same.
-    control : bool
-        Whether the passivity controller may damp; without it it only counts.
-    dead_man : bool
-        Whether the force acts only while the device's first button is held.
-    orphaned : callable
-        Returns whether the process that wanted the loop has ended; asked once a tick.
-    recorder : TickRecorder, optional
-        Takes down each tick while a recording is wanted.
+    It ticks 10 to 10,000 times a second. `stiffness` is the body's largest, N/m in its own metres; a body whose
+    stiffness isn't known, 0, is never softened, and `override` lets one that is too stiff for its device feel so all
+    the same. Without `control` the passivity controller only counts; with `dead_man` the force acts only while the
+    device's first button is held. `orphaned` returns whether the process that wanted the loop has ended; it is asked
+    once a tick.
 
-    Attributes
-    ----------
-    swap : Swap, optional
-        To be set where another surrogate shall take the place of the one in the hand; None again at its end.
-
-    Raises
-    ------
-    UsageError
-        If the model has more inputs, or keeps indentations at more places, than the shared memory carries, or the
-        rate is out of range.
+    Its `swap` is set where another surrogate shall take the place of the one in the hand, and None again at its end. A
+    model with more inputs, or indentations at more places, than the shared memory carries is refused.
     """
 
     def __init__(
@@ -210,10 +181,7 @@ class Loop:
     def run(self, rehearse: Callable[[], None] = lambda: None) -> None:
         """Tick until a command ends the loop or its parent is gone; leave the device at zero force.
 
-        Parameters
-        ----------
-        rehearse : callable
-            Called before each tick while there is time; see `palpate.runtime.rehearsal`.
+        `rehearse` is called before each tick while there is time; see `palpate.runtime.rehearsal`.
         """
         metronome = Metronome(self.period, jump=self.longest)
         gc.collect()
@@ -230,27 +198,14 @@ class Loop:
             self.end()
 
     def run_for(self, seconds: float, start: float = 0.0) -> None:
-        """Tick for a time of the loop's own clock, as fast as it can be computed; the device stays open.
-
-        Parameters
-        ----------
-        seconds, start : float
-            How long, and from which time on, s.
-        """
+        """Tick from `start` on, s, of the loop's own clock, as fast as it can be computed; the device stays open."""
         for k in range(round(seconds / self.period)):
             self.tick(start + k * self.period)
 
     def tick(self, now: float, lateness: float = 0.0, *, jumped: bool = False) -> None:
-        """Pass through the stages once.
+        """Pass through the stages once, from `now`, s, and `lateness`, s, behind the schedule.
 
-        Parameters
-        ----------
-        now : float
-            When the tick began, s.
-        lateness : float
-            How far behind its schedule that was, s.
-        jumped : bool
-            Whether the clock jumped since the last tick.
+        `jumped` says that the clock jumped since the last tick.
         """
         began = time.thread_time()
         self.now, self.fault = now, Fault.NONE
@@ -302,9 +257,8 @@ class Loop:
 
     def device_failed(self, error: Exception) -> None:
         """Record an error of the device's driver; of several ticks in a row, the first one's words are published."""
-        said = (
-            str(error).encode(errors="replace").decode()
-        )  # a service's words may hold what can't be written
+        # a service's words may hold what can't be written
+        said = str(error).encode(errors="replace").decode()
         if not self._driver_fails:
             self._driver_fails = True
             self.out.words(said or type(error).__name__)

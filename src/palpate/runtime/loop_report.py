@@ -22,20 +22,14 @@ if TYPE_CHECKING:
 __all__ = ["BINS", "EDGES", "Histogram", "LoopReport", "percentile"]
 
 BINS = 64
-_LOW, _DECADES = 1e-6, 6.0  # s, from 1 µs to 1 s
+_LOW, _DECADES = 1e-6, 6.0  # s where the bins begin, 1 µs, and decades from there to 1 s
 _PER_DECADE = (BINS - 2) / _DECADES
 
 EDGES = _LOW * 10.0 ** (np.arange(BINS - 1) / _PER_DECADE)  # (63,) s: bin k holds EDGES[k-1] ≤ t < EDGES[k]
 
 
 class Histogram:
-    """Counts durations into an array it is given, for example a field of the shared state.
-
-    Parameters
-    ----------
-    counts : (64,) int64
-        One for each bin; counted up in place.
-    """
+    """Counts durations into an array (64,) of int64 that it is given, for example a field of the shared state."""
 
     def __init__(self, counts: np.ndarray) -> None:
         self.counts = counts
@@ -51,20 +45,10 @@ class Histogram:
 
 
 def percentile(counts: np.ndarray, share: float) -> float:
-    """Return the duration that `share` of the samples stay below, s.
+    """Return the duration, s, that a `share` 0 … 1 of the samples of a `Histogram`, counts (64,), stay below.
 
-    Parameters
-    ----------
-    counts : (64,) int64
-        Of a `Histogram`.
-    share : float
-        0 … 1; 0.5 for the median.
-
-    Returns
-    -------
-    float
-        s, interpolated in log t inside its bin; 0 where nothing was counted or it lies below 1 µs, 1 s where
-        it lies above.
+    It is interpolated in log t inside its bin; 0 where nothing was counted or it lies below 1 µs, 1 s where it lies
+    above.
     """
     total = int(counts.sum())
     if total == 0:

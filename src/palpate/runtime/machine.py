@@ -24,33 +24,18 @@ _IDLE = 0.5  # load per CPU up to which the loop finds a CPU that nobody else wa
 
 @dataclass(frozen=True)
 class Check:
-    """One finding.
+    """One finding."""
 
-    Attributes
-    ----------
-    name : str
-        What was looked at.
-    ok : bool
-        Whether it is as a real-time loop wants it.
-    detail : str
-        What was found.
-    remedy : str
-        What to do about it; empty where all is well.
-    """
-
-    name: str
-    ok: bool
-    detail: str
-    remedy: str = ""
+    name: str  # what was looked at
+    ok: bool  # as a real-time loop wants it
+    detail: str  # what was found
+    remedy: str = ""  # what to do about it; empty where all is well
 
 
 def survey(root: Path = _ROOT) -> tuple[Check, ...]:
     """Look at scheduling, wake-up accuracy, CPUs, governor, container, load and kernel; takes 50 ms.
 
-    Parameters
-    ----------
-    root : Path
-        Folder below which ``/proc`` and ``/sys`` are read.
+    ``/proc`` and ``/sys`` are read below `root`.
     """
     checks = (_processors(), _governor(root), _container(root), _load(root), _kernel(root))
     return (_scheduling(), _wake_up(), *checks)

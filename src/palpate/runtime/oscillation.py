@@ -18,27 +18,20 @@ import numpy as np
 
 __all__ = ["OscillationWatch"]
 
-_CUTOFF = 10.0  # Hz
-_MEMORY = 0.2  # s
-_SMALLEST, _UNIT = 0.1, 0.2  # of the largest force: swings that count, and what weighs 1
+_CUTOFF = 10.0  # Hz: slower changes of the force are the hand's
+_MEMORY = 0.2  # s in which the sum of the weights is forgotten
+# shares of the device's largest force: the smallest swing that counts, and the one that weighs 1
+_SMALLEST, _UNIT = 0.1, 0.2
+# largest weight of one reversal, and sum of weights that is an oscillation
 _HEAVIEST, _TOO_MANY = 4.0 / 3.0, 4.0
-_PEAK, _MOST = 6.0, 0.5  # standard deviations of a body's answer to noise; share of the largest force
+# a body's answer to noise counts as none up to so many standard deviations, and up to this share of the largest force
+_PEAK, _MOST = 6.0, 0.5
 
 
 class OscillationWatch:
-    """Counts the reversals of the force that is sent.
+    """Counts the reversals of the force that is sent, by weight; `count` forgets them in 0.2 s.
 
-    Attributes
-    ----------
-    count : float
-        Weighted reversals, forgotten in 0.2 s.
-
-    Parameters
-    ----------
-    period : float
-        Time of a tick, s.
-    max_force : float
-        Largest ‖F‖ of the device, N.
+    `period` is the time of a tick, s, and `max_force` the largest ‖F‖ of the device, N.
     """
 
     def __init__(self, period: float, max_force: float) -> None:
@@ -55,14 +48,9 @@ class OscillationWatch:
         self._slow = self._swing = (0.0, 0.0, 0.0)
 
     def see(self, force: np.ndarray, answer: float) -> bool:
-        """Take the force (3,), N, of a tick; return whether it oscillates.
+        """Take the force (3,), N, that a tick sent; return whether it oscillates.
 
-        Parameters
-        ----------
-        force : (3,)
-            As sent, N.
-        answer : float
-            Standard deviation of what the body answers to the sensor's noise, N.
+        `answer` is the standard deviation of what the body answers to the sensor's noise, N.
         """
         x, y, z = force.tolist()
         a, b, c = self._slow

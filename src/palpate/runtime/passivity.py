@@ -23,9 +23,9 @@ the body holds (Ryu et al. 2005): the learnt body states its energy U in each ti
 
 Ū is filtered alike, v̄ is the speed of the filtered place, P the time of 20 ms or 2τ in which a debt is paid and over
 which α is filtered. While the force limit acts, neither work nor U counts: the hand doesn't put in what the body
-states, and a constant force leaks nothing. A debt B < 0 is forgotten
-in a second, a credit in a fifth: who holds the device has absorbed the energy by then, and what a body has swallowed is
-no licence to give it back. Damping already sent that has not acted yet counts towards B.
+states, and a constant force leaks nothing. A debt B < 0 is forgotten in a second, a credit in a fifth: who holds the
+device has absorbed the energy by then, and what a body has swallowed is no licence to give it back. Damping already
+sent that has not acted yet counts towards B.
 
 **How much may be damped**: on the apparent mass m, α ≤ m/2(T + d + τ), which is stable without a hand; α times the
 noise of the filtered speed stays below 2 % of the largest force; and below what the body itself answers to the noise,
@@ -75,12 +75,13 @@ _RING = LONGEST_DELAY + 2
 _SLOWEST = 1e-4  # m/s: below it a speed is as good as none, and carries no energy
 _SHARE = 0.5  # of m/(T + d): a damper sampled every T s and sent d s late is stable on the mass m below it
 _PAYBACK = 0.020  # s in which a debt is paid: shorter than a hand notices, longer than a tick of a slow loop
-_DEBT_MEMORY, _CREDIT_MEMORY = 1.0, 0.2  # s
+# s in which debt and credit are forgotten: who holds the device has absorbed them by then
+_DEBT_MEMORY, _CREDIT_MEMORY = 1.0, 0.2
 _FORCE_NOISE = 0.02  # of the largest force: rms of what damping may make of the sensor's noise
 _UNFELT = 2e-4  # N: peaks of damped noise below this need no bound
 _LIGHTEST = 0.1  # kg: the filter of a loop that only observes is that of such a device
-_BALL = 3.0  # standard deviations of the filtered place
-_LONGEST_FILTER = 0.030  # s
+_BALL = 3.0  # standard deviations of the filtered place that it must go before work is booked: less is noise
+_LONGEST_FILTER = 0.030  # s, the largest τ: work of motions faster than 1/τ is lost
 
 # places in the state: outputs first, then what the next step needs
 _ENERGY, _LOWEST, _DAMPING, _INJECTED, _LEAK, _NOISE = range(6)
@@ -96,19 +97,8 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 def largest_damping(mass: float, rate: float, *, delay: float = 0.0) -> float:
     """Return the largest damping (N·s/m) that the controller may add: half of m/(T + d).
 
-    Parameters
-    ----------
-    mass : float
-        Apparent mass of the device at its handle, kg, without the hand.
-    rate : float
-        Ticks per second, Hz.
-    delay : float
-        From the device's sample to its force, beyond the hold of one tick, s; the lag of a filter included.
-
-    Raises
-    ------
-    UsageError
-        If mass or rate is not positive, or the delay negative.
+    `mass` is the apparent mass of the device at its handle, kg, without the hand; `rate` is 1/T, Hz; `delay` is d, s,
+    from the device's sample to its force, beyond the hold of one tick, the lag of a filter included.
     """
     if not (mass > 0.0 and rate > 0.0 and delay >= 0.0):
         raise UsageError(
@@ -121,35 +111,16 @@ def largest_damping(mass: float, rate: float, *, delay: float = 0.0) -> float:
 class PassivityController:
     """The energy ledger of one hand and the damping that keeps it from getting more than it gave.
 
-    Parameters
-    ----------
-    period : float
-        Nominal time of a tick, s.
-    max_force : float
-        Largest ‖F‖ that may be sent, N; may change at any tick.
-    mass : float
-        Apparent mass of the device, kg; 0 observes only, as for a device without motors.
-    noise : float
-        Standard deviation of the device's places along one axis, m, as stated; what is measured counts where it is
-        larger.
+    `period` is the nominal time of a tick, s; `max_force` the largest ‖F‖ that may be sent, N, which may change at any
+    tick; `mass` the apparent mass of the device, kg, 0 observes only, as for a device without motors; `noise` the
+    standard deviation of the device's places along one axis, m, as stated; what is measured counts where it is larger.
 
-    Attributes
-    ----------
-    state : (27,)
-        All that the next step depends on besides its arguments, together with `sent` and `places`; may be copied and
-        put back.
-    ledger : (6,)
-        A view of its outputs: E, lowest E, α, energy that damping was meant to take, `leak`, and `noise`.
-    sent : (64, 4)
-        The latest forces, N, and the energy that the damping in each will take, J; a ring.
-    places : (21,)
-        Differences of the latest places, of which the noise is measured.
-    delay : float
-        From the device's sample to its force, s; may change at any tick.
-    stiffness : float
-        The largest that the hand feels, N/m; 0 where it isn't known. May change at any tick.
-    added : float
-        Energy that the body has gained by no work of the hand, in all, J; see `book`.
+    `state` (27,) has all that the next step depends on besides its arguments, together with `sent` (64, 4), a ring of
+    the latest forces, N, and the energy that the damping in each will take, J, and `places` (21,), differences of the
+    latest places, of which the noise is measured; all may be copied and put back. `ledger` (6,) is a view of its
+    outputs: E, lowest E, α, energy that damping was meant to take, `leak`, and `noise`. `delay`, s, from the device's
+    sample to its force, and `stiffness`, N/m, the largest that the hand feels, 0 where it isn't known, may change at
+    any tick. `added` is the energy that the body has gained by no work of the hand, in all, J; see `book`.
     """
 
     def __init__(self, period: float, *, max_force: float, mass: float = 0.0, noise: float = 0.0) -> None:
@@ -217,20 +188,10 @@ class PassivityController:
     ) -> None:
         """Count the way from the last position, and damp the force where the hand was given too much.
 
-        Parameters
-        ----------
-        position : (3,)
-            The hand, m.
-        force : (3,)
-            What would be sent, N, in the same axes; overwritten by what shall be sent.
-        elapsed : float
-            Since the last step, s.
-        stored : float
-            Energy that the body holds, J, as far as the hand can get it back; 0 compares the ledger with zero.
-        clamped : bool
-            Whether the force limit acts, so that the hand doesn't put in what the body states.
-        free : bool
-            Whether nothing is touched: then a credit ends.
+        `position` (3,) is the hand's, m; `force` (3,), N, in the same axes, what would be sent, overwritten by what
+        shall be. `elapsed` s have passed since the last step. `stored` is the energy that the body holds, J, as far as
+        the hand can get it back; 0 compares the ledger with zero. `clamped` says that the force limit acts, so that the
+        hand doesn't put in what the body states; `free` that nothing is touched: then a credit ends.
         """
         _step(
             self.state,

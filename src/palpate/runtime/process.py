@@ -39,7 +39,7 @@ __all__ = ["LoopProcess"]
 T = TypeVar("T")
 
 _START = 60.0  # s: the first start on a machine compiles the kernels
-_STOP = 2.0  # s
+_STOP = 2.0  # s that the process may take to end: then it is terminated, and as long after that killed
 _SWAP = 60.0  # s until a surrogate is in the hand: its reading, and a blend before it
 
 

@@ -21,12 +21,8 @@ _EVERY = 100  # ticks between two updates of the rate: 10 Hz is what an eye can 
 class Publisher:
     """Fills and publishes state and indentations; the stages write to its views `hand`, `position` and `force` (3,).
 
-    Attributes
-    ----------
-    record : record of dtype `STATE`, shape ()
-        The tick that is being filled.
-    offset : float
-        Added to the time that is published, s: a replay that others look at has times of its own.
+    `record`, of dtype `STATE` and shape (), is the tick that is being filled. `offset`, s, is added to the time that is
+    published: a replay that others look at has times of its own.
     """
 
     def __init__(self, shared: Shared, inputs: int) -> None:

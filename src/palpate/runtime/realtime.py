@@ -33,24 +33,12 @@ _SETTLED = 0.25  # s without a touch after which the loop rests: taps come faste
 
 
 class Metronome:
-    """Beats at a fixed period on a fixed grid.
+    """Beats at a fixed `period`, s, on a fixed grid.
 
-    Parameters
-    ----------
-    period : float
-        Time between two beats, s.
-    spin : float
-        The last stretch before a beat that is not slept through, s.
-    jump : float
-        A pause between two beats from which on the clock counts as having jumped, s: the machine slept, or
-        the process did. The device has held its last force for all that time.
-
-    Attributes
-    ----------
-    lateness : float
-        The latest beat behind its schedule, s.
-    jumped : bool
-        Whether the clock ran backwards, or paused for more than `jump`, before the latest beat.
+    `spin` is the last stretch before a beat that is not slept through, s. A pause of `jump`, s, between two beats
+    counts as a jump of the clock: the machine slept, or the process did, and the device has held its last force for all
+    that time. `lateness` is the latest beat's behind its schedule, s; `jumped` says whether the clock ran backwards, or
+    paused for more than `jump`, before it.
     """
 
     def __init__(
@@ -111,29 +99,16 @@ class Metronome:
 
 
 class Rest:
-    """Says when the loop may tick slowly: nobody touches, and nobody is about to.
-
-    Attributes
-    ----------
-    resting : bool
-        Whether the next beat may be a slow one.
-    """
+    """Says by `resting` when the loop may tick slowly: nobody touches, and nobody is about to."""
 
     def __init__(self, period: float) -> None:
         self.resting = False
         self._slow, self._free = max(period, SLOW), 0.0
 
     def see(self, elapsed: float, distance: float, way: float) -> None:
-        """Take one tick.
+        """Take one tick, `elapsed` s after the one before, in which the hand went a `way`, m.
 
-        Parameters
-        ----------
-        elapsed : float
-            Since the tick before, s.
-        distance : float
-            From the hand to the body, m; infinite where there is no hand, zero where it touches.
-        way : float
-            Of the hand since the tick before, m.
+        `distance` is from the hand to the body, m; infinite where there is no hand, zero where it touches.
         """
         near = max(_CLEAR, _BEATS * self._slow * way / elapsed) if elapsed > 0.0 else math.inf
         self._free = self._free + elapsed if distance > near else 0.0
@@ -143,16 +118,13 @@ class Rest:
 _FIFO_PRIORITY = 40  # above ordinary work, below the kernel's own interrupt threads (50)
 _PR_SET_TIMERSLACK = 29  # Linux, prctl(2)
 _MCL_CURRENT = 1  # Linux and macOS, mlockall(2); MCL_FUTURE would make later allocations fail at the limit
-_NICE = -10
+_NICE = -10  # where there is no real-time scheduling: before ordinary work, at 0
 
 
 def obtain() -> dict[str, str]:
     """Ask for real-time scheduling, exact timers and resident memory for the calling thread and process.
 
-    Returns
-    -------
-    dict of str
-        Under ``scheduler``, ``timer slack`` and ``memory`` what was granted, in words.
+    It returns what was granted, in words, under ``scheduler``, ``timer slack`` and ``memory``.
     """
     return {"scheduler": _scheduler(), "timer slack": _timer_slack(), "memory": _memory()}
 

@@ -31,28 +31,10 @@ _LAST = 0.2  # s that the loop's first state may still be on its way where a rec
 
 
 class TraceRecorder:
-    """Records what one loop does into one file, from its making until `stop`.
+    """Records what one loop writes into a ring into one new file, from its making until `stop`.
 
-    Parameters
-    ----------
-    ring : Ring
-        That the loop fills.
-    path : path
-        A new file.
-    header : mapping
-        What is known of model, device and rate before the loop says more.
-
-    Attributes
-    ----------
-    error : PalpateError or None
-        Why the recording has stopped by itself.
-    ticks, size : int
-        Ticks and bytes that are in the file.
-
-    Raises
-    ------
-    UsageError, ResourceError
-        If the file can't be made.
+    The header says what is known of model, device and rate before the loop says more. `error` is why the recording has
+    stopped by itself; `ticks` and `size` count ticks and bytes that are in the file.
     """
 
     def __init__(self, ring: Ring, path: str | os.PathLike[str], header: Mapping[str, Any]) -> None:
@@ -91,24 +73,16 @@ class TraceRecorder:
         return self._ring.lost - self._lost
 
     def add_event(self, kind: str, **facts: Any) -> None:
-        """Note an event, such as another surrogate that answers from here on.
+        """Note an event of a kind, such as ``swap``: another surrogate answers from here on.
 
-        Parameters
-        ----------
-        kind : str
-            Such as ``swap``.
-        **facts
-            Numbers and texts that tell of it; ``tick`` is the newest tick written.
+        The facts are numbers and texts that tell of it; ``tick`` is the newest tick written.
         """
         self._events.append({"kind": kind, "tick": self.ticks} | facts)
 
     def stop(self, end: Callable[[], Mapping[str, Any]] | None = None) -> None:
         """Write what is left and close the file; harmless when repeated.
 
-        Parameters
-        ----------
-        end : callable, optional
-            Returns what is to be said of the end, as JSON takes it.
+        `end` returns what is to be said of the end, as JSON takes it.
         """
         if self._end.is_set():
             return
@@ -213,12 +187,6 @@ def _processor() -> str:
 
 
 def model_facts(path: str | os.PathLike[str]) -> dict[str, str]:
-    """Return name, path as given, and checksum of a model's file, by which a replay finds it and knows it again.
-
-    Raises
-    ------
-    OSError
-        If the file can't be read.
-    """
+    """Return name, path as given, and checksum of a model's file, by which a replay finds it and knows it again."""
     path = Path(path)
     return {"file": path.name, "path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}

@@ -90,7 +90,7 @@ TICK = np.dtype(
     ]
 )
 
-_SECONDS, _LEAST = 4.0, 4096  # of ticks that the ring holds
+_SECONDS, _LEAST = 4.0, 4096  # s of ticks that the ring holds, and ticks at the least
 _FASTEST = 10_000.0  # Hz; a loop at a higher rate is refused, and needs no room before that
 _HEAD = 4096  # bytes before the slots: counters
 _FACTS = 64 * 1024  # bytes for what the loop says of itself, JSON
@@ -101,20 +101,11 @@ _MAGIC = b"palpate ring %08x\n" % zlib.crc32(repr(TICK.descr).encode())
 class Ring:
     """Ticks on their way from the loop to the process that writes them down, in shared memory.
 
-    One side fills it (`TickRecorder`), the other empties it (`take`). Neither waits.
-
-    Attributes
-    ----------
-    name : str
-        Path of the shared memory, for `attach`; empty for one that a single process uses.
-    head : () int64
-        Number of ticks written so far.
-    asked : () int64
-        Number of the recording that the reader wants, 0 for none.
-    begun : () int64
-        Number of the recording that the loop has begun, and whose first state is in the ring.
-    number : int
-        Of the latest recording that this side has asked for; counted by the reader.
+    One side fills it (`TickRecorder`), the other empties it (`take`); neither waits. `name` is the path of the shared
+    memory, for `attach`, empty for one that a single process uses. In it lie three counters, () int64: `head`, the
+    ticks written so far; `asked`, the number of the recording that the reader wants, 0 for none; and `begun`, that of
+    the one which the loop has begun and whose first state is in the ring. `number` counts the recordings that this
+    side, the reader, has asked for.
     """
 
     def __init__(self, name: str, memory: mmap.mmap) -> None:
@@ -122,9 +113,8 @@ class Ring:
         view = memoryview(memory)
         counters = np.frombuffer(view[64:_HEAD], np.int64, 8)
         self.head, self.asked, self.begun = (counters[k : k + 1].reshape(()) for k in range(3))
-        self._sizes = counters[
-            3:5
-        ]  # bytes of facts and of the snapshot; the latter -1 where there was no room
+        # bytes of facts and of the snapshot; the latter -1 where there was no room
+        self._sizes = counters[3:5]
         self._facts = view[_HEAD : _HEAD + _FACTS]
         self._snapshot = view[_HEAD + _FACTS : _HEAD + _FACTS + _SNAPSHOT]
         slots = view[_HEAD + _FACTS + _SNAPSHOT :]
@@ -136,13 +126,7 @@ class Ring:
 
     @classmethod
     def create(cls, rate: float) -> Ring:
-        """Make a ring that holds some seconds of ticks at `rate` (Hz).
-
-        Raises
-        ------
-        DeviceError
-            If the system gives no shared memory.
-        """
+        """Make a ring that holds some seconds of ticks at `rate` (Hz)."""
         try:
             return cls.attach(shared_memory.create(_MAGIC, _size(rate)))
         except OSError as error:
@@ -154,13 +138,7 @@ class Ring:
 
     @classmethod
     def attach(cls, name: str) -> Ring:
-        """Join a ring made by `create` in another process.
-
-        Raises
-        ------
-        DeviceError
-            If there is none of that name, or another version of palpate made it.
-        """
+        """Join a ring made by `create` in another process; one of another version of palpate is a DeviceError."""
         try:
             memory = shared_memory.attach(name, _MAGIC)
         except (OSError, ValueError) as error:
@@ -261,15 +239,7 @@ def _keep_states(states: queue.SimpleQueue[_Begun | None], ring: Ring) -> None:
 
 
 class RecordedDevice:
-    """A device whose samples, failures and forces are noted for the recording.
-
-    Parameters
-    ----------
-    device : Device
-        The one that is read and written.
-    record : record of dtype `TICK`, shape ()
-        Takes the sample and the force.
-    """
+    """A device whose samples, failures and forces are noted for the recording, in a record () of dtype `TICK`."""
 
     def __init__(self, device: Device, record: np.ndarray) -> None:
         self.device = device
@@ -314,17 +284,8 @@ class RecordedDevice:
 class TickRecorder:
     """Writes each tick of a loop into a ring, as long as the reader of the ring wants it.
 
-    Parameters
-    ----------
-    ring : Ring
-        Takes the ticks.
-
-    Attributes
-    ----------
-    record : record of dtype `TICK`, shape ()
-        The tick that was written last.
-    number : int
-        Of the recording whose ticks are written; 0 for none.
+    `record`, of dtype `TICK` and shape (), is the tick that was written last; `number` is that of the recording whose
+    ticks are written, 0 for none.
     """
 
     def __init__(self, ring: Ring) -> None:

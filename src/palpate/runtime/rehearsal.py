@@ -21,19 +21,7 @@ __all__ = ["Rehearsal"]
 
 
 class Rehearsal:
-    """Performs dry ticks, without any effect outside itself.
-
-    Parameters
-    ----------
-    model : Model
-        The learnt body.
-    workspace : Workspace
-        Of the real loop.
-    limits : Limits
-        Of the real loop.
-    rate : float
-        Ticks per second, Hz.
-    """
+    """Performs dry ticks, of the real loop's workspace, limits and rate (Hz), without any effect outside itself."""
 
     def __init__(self, model: Model, workspace: Workspace, limits: Limits, rate: float) -> None:
         stage = Shared.private()

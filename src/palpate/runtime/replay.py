@@ -34,8 +34,9 @@ from palpate.runtime.workspace import Workspace
 
 __all__ = ["Replay", "ReplayDevice", "Replayed", "is_recorded_model", "loop_facts", "play"]
 
-_CHUNK = 1000  # ticks
-_LEAD, _IDLE = 0.2, 0.02  # s before a replay that is looked at begins, and between two looks at its end
+_CHUNK = 1000  # ticks that are written at once
+# s before a replay that is looked at begins, and between two looks for a command at its end
+_LEAD, _IDLE = 0.2, 0.02
 
 _ERRORS: dict[int, type[DeviceError]] = {
     Fault.DEVICE_LOST: DeviceLostError,
@@ -47,17 +48,7 @@ _BIT = {name: 1 << k for k, name in enumerate(FLAGS)}
 
 
 def loop_facts(model: Touchable, loop: Loop, limits: Limits) -> dict[str, Any]:
-    """Return what a replay must know of a loop to build it anew, as JSON takes it.
-
-    Parameters
-    ----------
-    model : Touchable
-        The body that is touched.
-    loop : Loop
-        Before its first tick.
-    limits : Limits
-        Of the loop.
-    """
+    """Return what a replay must know of a loop before its first tick to build it anew, as JSON takes it."""
     traits, space = loop.device.traits, loop.workspace
     return {
         "name": model.name,
@@ -81,18 +72,9 @@ def _stated(figures: dict[str, Any]) -> dict[str, Any]:
 
 
 class ReplayDevice:
-    """A device that says what a recorded one said, tick by tick.
+    """A device that says what a recorded one, of the same traits, said in the tick `row` of dtype `TICK`.
 
-    Attributes
-    ----------
-    traits : Traits
-        The recorded device's.
-    row : record of dtype `TICK`
-        The tick that is replayed.
-    dead_man : bool
-        Whether a dead-man button was asked for.
-    sent : (3,)
-        The latest force, N, in the device's axes.
+    `dead_man` tells whether a dead-man button was asked for; `sent` (3,) is the latest force, N, in the device's axes.
     """
 
     def __init__(self, traits: Traits, *, dead_man: bool = False) -> None:
@@ -102,13 +84,7 @@ class ReplayDevice:
     row: Any
 
     def read(self, now: float) -> Sample:
-        """Return the recorded sample.
-
-        Raises
-        ------
-        DeviceError
-            Where the recorded driver failed.
-        """
+        """Return the recorded sample; raise a DeviceError where the recorded driver failed."""
         row, sample = self.row, self.sample
         flags = int(row["flags"])
         if flags & _BIT["read_failed"]:
@@ -122,13 +98,7 @@ class ReplayDevice:
         return sample
 
     def write(self, force: np.ndarray) -> None:
-        """Remember the force (3,), N.
-
-        Raises
-        ------
-        DeviceError
-            Where the recorded driver failed.
-        """
+        """Remember the force (3,), N; raise a DeviceError where the recorded driver failed."""
         self.sent[:] = force
         if self.row is not None and int(self.row["flags"]) & _BIT["write_failed"]:
             raise _ERRORS.get(int(self.row["fault"]), DeviceError)("The recorded device failed here.")
@@ -139,39 +109,15 @@ class ReplayDevice:
 
 
 class Replay:
-    """A loop that goes through a recorded touch.
+    """A loop that goes through a recorded touch of at least one tick, with the recorded body or another.
 
-    Parameters
-    ----------
-    trace : Trace
-        With at least one tick.
-    model : Touchable
-        The body that is touched, the recorded one or another.
-    shared : Shared, optional
-        Where the ticks are published; by default nobody sees them. Commands of others are not heard.
-    same : bool
-        Whether it is the recorded body: its state is put back then, and the surrogates that took its place in the
-        recording do so again.
-    own_workspace : bool
-        Whether another body lies in the hand as it would by itself; by default it lies as the recorded one did, so
-        that the same motion reaches the same places.
-    successor : callable, optional
-        Returns the surrogate that took over, of an event of the trace, or None where there is none; by default it is
-        read from its recorded file, where that was or beside the trace.
-
-    Attributes
-    ----------
-    loop : Loop
-        The loop, between two ticks.
-    device : ReplayDevice
-        Where it finds the hand.
-
-    Raises
-    ------
-    UsageError
-        If the trace holds no tick, or the body is held where the recorded one was pressed.
-    FileFormatError
-        If the recorded state doesn't fit the body, or the trace doesn't say what its loop was.
+    The recorded body (`same`) has its state put back, and the surrogates that took its place in the recording do so
+    again: `successor` returns one for an event of the trace, or None; by default it is read from its recorded file,
+    where that was or beside the trace. Another body lies as the recorded one did, so that the same motion reaches the
+    same places, or with `own_workspace` as it would by itself. Ticks are published in `shared`, by default for nobody;
+    commands of others are not heard. `loop` stands between two ticks; `device` is where it finds the hand. A body that
+    is held where the recorded one was pressed is refused; a FileFormatError says that the recorded state doesn't fit
+    the body, or that the trace doesn't say what its loop was.
     """
 
     def __init__(
@@ -275,26 +221,13 @@ class Replay:
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
-    """The outcome of a replay.
+    """The outcome of a replay."""
 
-    Attributes
-    ----------
-    trace : Trace
-        What was recorded.
-    ticks : (N,) of dtype `TICK`
-        The ticks of the replay.
-    name : str
-        Of the body that answered in the replay.
-    same : bool
-        Whether it is the recorded one.
-    missing : tuple of str
-        Surrogates, in words, that took over in the recording and did not in the replay.
-    """
-
-    trace: Trace
-    ticks: np.ndarray
-    name: str
-    same: bool = True
+    trace: Trace  # what was recorded
+    ticks: np.ndarray  # (N,) of dtype `TICK`, of the replay
+    name: str  # of the body that answered in the replay
+    same: bool = True  # that is the recorded one
+    # surrogates, in words, that took over in the recording but not in the replay
     missing: tuple[str, ...] = ()
 
     @property
@@ -347,20 +280,7 @@ class Replayed:
         )
 
     def save(self, path: str | os.PathLike[str], model: str | os.PathLike[str]) -> None:
-        """Write the replay as a trace of its own.
-
-        Parameters
-        ----------
-        path : path
-            A new file.
-        model : path
-            File of the body that answered.
-
-        Raises
-        ------
-        UsageError, ResourceError
-            As for `palpate.runtime.trace_file.TraceWriter`.
-        """
+        """Write the replay as a trace of its own, a new file; `model` is the file of the body that answered."""
         header = dict(self.trace.header) | machine_facts()
         header |= {"name": self.name, "model": model_facts(model), "replay_of": self.trace.path.name}
         writer = TraceWriter(path, header)
@@ -395,20 +315,9 @@ def play(
 ) -> None:
     """Go through a recorded touch at the pace at which it was recorded, for those who look at the shared memory.
 
-    At its end nothing is held any more, and the last tick stands until a command ends it.
-
-    Parameters
-    ----------
-    trace : Trace
-        With at least one tick.
-    model : Touchable
-        The body that answers.
-    shared : Shared
-        Where the ticks are published; of its commands only ``quit`` is heard.
-    orphaned : callable
-        Returns whether the process that wanted the replay has ended.
-    same : bool
-        Whether it is the recorded body.
+    At its end nothing is held any more, and the last tick stands until a command ends it: of the commands only ``quit``
+    is heard. `orphaned` returns whether the process that wanted the replay has ended; `same` says that the body is the
+    recorded one.
     """
     replay = Replay(trace, model, shared, same=same)
     out, times, start = replay.loop.out, trace.time, now() + _LEAD

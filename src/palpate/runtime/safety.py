@@ -79,13 +79,10 @@ HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised de
 _SHORTEST_RAMP = 0.050  # s
 _WARMING = 10.0  # s over which motors average the force; windings take longer, which is on the safe side
 _WARM = 0.8  # share of the continuous force's square from which on the limit comes down
-_DOUBTS, _DOUBTFUL = (
-    3,
-    0.015,
-)  # count of impossible samples, and time of them, s, from which on they are a fault
-_LEAK = (
-    0.1  # of the count, for each believed sample: a line that spoils more than one sample in ten is broken
-)
+# count of impossible samples, and time of them, s, from which on they are a fault
+_DOUBTS, _DOUBTFUL = 3, 0.015
+# taken off the count for each believed sample: a line that spoils more than one sample in ten is broken
+_LEAK = 0.1
 _ACCELERATION = 150.0  # m/s²: fast hands stay below 100, and 12 N on a bare handle of 0.1 kg make 120
 _NOISE = 3e-4  # m rms along each axis that every sensor is granted: several times that of any that is sold
 _OUTLIER = 4.5  # times the rms along each axis: of the three axes together one in ten thousand is larger
@@ -94,28 +91,12 @@ _RISE = 0.020  # s from zero to full force where no slew is given: a tenth of a 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits that protect a device and its user.
+    """Limits that protect a device and its user."""
 
-    Attributes
-    ----------
-    max_force : float
-        Largest ‖F‖, N.
-    slew : float
-        Largest rate of change of the force, N/s; 0 chooses full force in 20 ms.
-    ramp : float
-        Time in which the force grows after a grab, s, at least 0.05.
-    continuous : float
-        Largest force that the motors bear for long, N; infinite where the device states none.
-
-    Raises
-    ------
-    UsageError
-        If a limit is not a positive number, or the ramp too short.
-    """
-
-    max_force: float
-    slew: float = 0.0
-    ramp: float = _SHORTEST_RAMP
+    max_force: float  # N, largest ‖F‖
+    slew: float = 0.0  # N/s, largest rate of change of the force; 0 chooses full force in 20 ms
+    ramp: float = _SHORTEST_RAMP  # s in which the force grows after a grab, at least 0.05
+    # N, largest force that the motors bear for long; infinite where the device states none
     continuous: float = math.inf
 
     def __post_init__(self) -> None:
@@ -138,12 +119,8 @@ class Limits:
 class Safety:
     """Applies the four laws, one tick at a time.
 
-    Attributes
-    ----------
-    force : (3,)
-        What may be sent, N; the array given, overwritten by `apply` and, once damping was added, by `slew`.
-    clamped : bool
-        Whether the force limit acted on the latest tick.
+    `force` (3,), N, is what may be sent: the array given, overwritten by `apply` and, once damping was added, by
+    `slew`. `clamped` says whether the force limit acted on the latest tick.
     """
 
     def __init__(self, limits: Limits, period: float, force: np.ndarray) -> None:
@@ -221,27 +198,13 @@ class PlaceCheck:
 
     A single bad sample is passed over. After a doubt, a place that is merely sudden is believed: a handle that hits its
     end stop is that once. Each doubt counts 1, each believed sample takes a tenth of one away, and a count of three is
-    a fault: three bad samples in a row, or nine to and fro, and never one in eleven. 15 ms of doubts are a fault
-    too. After three in a row the newest place is what the next one is compared with, so that an arm which was moved
-    while nobody looked is believed again.
+    a fault: three bad samples in a row, or nine to and fro, and never one in eleven. 15 ms of doubts are a fault too.
+    After three in a row the newest place is what the next one is compared with, so that an arm which was moved while
+    nobody looked is believed again.
 
-    Attributes
-    ----------
-    doubts : int
-        Impossible samples in a row; 0 where the latest is believed.
-    fault : bool
-        Whether they are too many.
-
-    Parameters
-    ----------
-    reach : float
-        No place is farther from the centre than this, m.
-    speed : float
-        No handle is faster than this, m/s.
-    period : float
-        Shortest time between two samples, s.
-    noise : float
-        Noise of the sensor along each axis, m rms; every sensor is granted 0.3 mm.
+    No place is farther from the centre than `reach`, m, no handle faster than `speed`, m/s, and no two samples closer
+    than `period`, s; every sensor is granted noise of 0.3 mm rms along each axis, or a larger `noise`, m. `doubts`
+    counts the impossible samples in a row, 0 where the latest is believed; `fault` says whether they are too many.
     """
 
     def __init__(self, reach: float, speed: float, period: float, noise: float = 0.0) -> None:
@@ -300,13 +263,7 @@ class PlaceCheck:
 
 
 class Stop:
-    """A person's stop: the force stays zero until the person resumes.
-
-    Attributes
-    ----------
-    stopped : bool
-        Whether the force is stopped.
-    """
+    """A person's stop: the force stays zero until the person resumes."""
 
     def __init__(self) -> None:
         self.stopped = False

@@ -49,19 +49,10 @@ def snapshot(loop: Loop) -> dict[str, Any]:
 
 
 def restore(loop: Loop, values: Mapping[str, Any]) -> None:
-    """Put what a loop remembered into one that was made for the same body, device and rate.
+    """Put what a loop remembered into one that was made for the same body, device and rate; it is changed in place.
 
-    Parameters
-    ----------
-    loop : Loop
-        Changed in place.
-    values : mapping of name to number or array
-        Of `snapshot`, also after a way through a file, where numbers are arrays of shape ().
-
-    Raises
-    ------
-    FileFormatError
-        If the two loops differ in what they remember.
+    The values are those of `snapshot`, also after a way through a file, where numbers are arrays of shape (). A
+    FileFormatError says that the two loops differ in what they remember.
     """
     if "bounds.delay" in values:
         loop.take_delay(float(values["bounds.delay"]))

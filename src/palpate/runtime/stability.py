@@ -46,21 +46,8 @@ def passive_stiffness(
 ) -> float:
     """Return the stiffness (N/m) below which the loop is passive; Colgate & Schenkel 1997.
 
-    Parameters
-    ----------
-    damping : float
-        The device's own, b, N·s/m.
-    rate : float
-        Ticks per second, Hz.
-    delay : float
-        From the device's sample to its force, beyond the hold of one tick, s.
-    virtual_damping : float
-        B that the loop adds, N·s/m.
-
-    Raises
-    ------
-    UsageError
-        If the rate is not positive, or damping or delay negative.
+    `damping` is the device's own b, N·s/m, and `virtual_damping` B that the loop adds; `rate` is in Hz; `delay` is the
+    time from the device's sample to its force, beyond the hold of one tick, s.
     """
     _check(damping, rate, delay)
     return max(0.0, (damping - abs(virtual_damping)) / (0.5 / rate + delay))
@@ -69,49 +56,23 @@ def passive_stiffness(
 def stable_stiffness(
     damping: float, rate: float, *, delay: float = 0.0, virtual_damping: float = 0.0
 ) -> float:
-    """Return the stiffness (N/m) below which a loop with a transport delay (s) is stable; Gil et al. 2009.
-
-    Raises
-    ------
-    UsageError
-        If the rate is not positive, or damping or delay negative.
-    """
+    """Return the stiffness (N/m) below which a loop with a transport delay (s) is stable; Gil et al. 2009."""
     _check(damping, rate, delay)
     return max(0.0, (damping + virtual_damping) / (0.5 / rate + delay))
 
 
 @dataclass(frozen=True)
 class FeltStiffness:
-    """The stiffness of a body in the hand and its bound, on one device, at one rate and delay.
+    """The stiffness of a body in the hand and its bound, on one device, at one rate and delay."""
 
-    Attributes
-    ----------
-    body : float
-        The body's largest stiffness in hand metres, N/m: `Workspace.felt(model.stiffness_max)`.
-    damping : float or None
-        The device's own, b, N·s/m; None for one without motors, which can't become unstable.
-    rate : float
-        Ticks per second, Hz.
-    delay : float
-        From the device's sample to its force, beyond the hold of one tick, s.
-    override : bool
-        Whether the body shall feel as stiff as it is, whatever follows from that.
-    stated : float
-        Largest stiffness that the device's maker states, N/m; infinite where none is stated.
-    delay_known : bool
-        Whether the delay was stated or measured; an unknown one is taken for none.
-    controlled : bool
-        Whether the passivity controller may damp.
-    """
-
-    body: float
-    damping: float | None
-    rate: float
-    delay: float = 0.0
-    override: bool = False
-    stated: float = math.inf
-    delay_known: bool = True
-    controlled: bool = True
+    body: float  # N/m, the body's largest in hand metres: `Workspace.felt(model.stiffness_max)`
+    damping: float | None  # N·s/m, the device's own b; None without motors, which can't become unstable
+    rate: float  # Hz, of ticks
+    delay: float = 0.0  # s from the device's sample to its force, beyond the hold of one tick
+    override: bool = False  # the body shall feel as stiff as it is, whatever follows from that
+    stated: float = math.inf  # N/m, largest that the device's maker states; infinite where none is stated
+    delay_known: bool = True  # the delay was stated or measured; an unknown one is taken for none
+    controlled: bool = True  # the passivity controller may damp
 
     @classmethod
     def on(cls, traits: Traits, body: float, rate: float, override: bool, controlled: bool) -> FeltStiffness:

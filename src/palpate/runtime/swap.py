@@ -42,40 +42,23 @@ _SAME = 1e-9  # of a probe's radius, and of a direction
 
 @dataclass(frozen=True, eq=False)
 class _Successor:
-    """The surrogate that takes over, made before the loop sees it.
+    """The surrogate that takes over, made before the loop sees it."""
 
-    Attributes
-    ----------
-    evaluator : HandEvaluator
-        Its answer.
-    carry : callable, optional
-        Hands the memory on.
-    stiffness : float
-        Its largest, N/m in its own metres; 0 where it isn't known.
-    gap : callable
-        Difference of the two energies at rest, J, at further inputs (p,): the energy of a body whose place of rest
-        moves with its other loads counts from anywhere.
-    """
-
-    evaluator: HandEvaluator
-    carry: Carry | None
-    stiffness: float
+    evaluator: HandEvaluator  # its answer
+    carry: Carry | None  # hands the memory on
+    stiffness: float  # N/m, its largest, in its own metres; 0 where it isn't known
+    # J, difference of the two energies at rest, at further inputs (p,): the energy of a body whose place of rest moves
+    # with its other loads counts from anywhere
     gap: Callable[[np.ndarray], float]
 
 
 class Swap:
     """One swap, from its first tick to its last; the loop calls `step` at the beginning of each tick.
 
-    Attributes
-    ----------
-    begun, ended : int
-        Number of the tick with which it began, and of the first one that the new surrogate answered alone; 0 before.
-    seconds : float
-        Time of the blend where nothing slows it down, s.
-    facts : bytes
-        What the loop says of itself to those who record it from then on; empty for nothing new.
-    rehearse : callable
-        Called as it begins: the rehearsal takes over the new surrogate, too.
+    `begun` and `ended` are the numbers of the tick with which it began, and of the first that the new surrogate
+    answered alone; 0 before. `seconds` is the time of the blend where nothing slows it down, s. `facts` is what the
+    loop says of itself to those who record it from then on, empty for nothing new; `rehearse` is called as it begins:
+    the rehearsal takes over the new surrogate, too.
     """
 
     def __init__(self, successor: _Successor, seconds: float = SECONDS) -> None:
@@ -160,21 +143,10 @@ def _progress_at(share: float) -> float:
 def swap_between(
     old: Touchable, new: Touchable, *, seconds: float = SECONDS, stiffness: float | None = None
 ) -> Swap:
-    """Return the swap that leads a hand from one surrogate of a body to another.
+    """Return the swap that leads a hand from one surrogate of a body to another, blended in `seconds`, at least 0.1 s.
 
-    Parameters
-    ----------
-    old, new : Touchable
-        In the hand, and to be there.
-    seconds : float
-        Time of the blend, s, at least 0.1.
-    stiffness : float, optional
-        The new one's largest, N/m; by default it is worked out.
-
-    Raises
-    ------
-    UsageError
-        If they are not of the same body in the same hand, the memory can't be handed on, or the new one doesn't answer.
+    `stiffness` is the new one's largest, N/m; by default it is worked out. A memory that can't be handed on, or a new
+    one that doesn't answer, is refused.
     """
     require_same_body(old, new)
     carry = None
@@ -217,13 +189,7 @@ def _gap(old: Touchable, new: Touchable) -> Callable[[np.ndarray], float]:
 
 
 def require_same_body(old: Touchable, new: Touchable) -> None:
-    """Refuse a surrogate that can't take the place of another one in the hand.
-
-    Raises
-    ------
-    UsageError
-        With what differs.
-    """
+    """Refuse a surrogate that can't take the place of another one in the hand, with what differs."""
     if why := _difference(old, new):
         raise UsageError(
             f"{new.name} can't take the place of {old.name}, which stays in the hand: {why}.",

@@ -39,10 +39,7 @@ _SWITCH = 1e-4  # s after which a thread that holds the interpreter is asked for
 class SwapDesk:
     """Takes wishes for other surrogates, one after the other, and answers each.
 
-    Parameters
-    ----------
-    say : callable
-        Takes each answer: ``swap``, the number of the wish, and ``begun``, the tick, or ``refused``, why not.
+    `say` takes each answer: ``swap``, the number of the wish, and ``begun``, the tick, or ``refused``, why not.
     """
 
     def __init__(self, say: Callable[[dict[str, object]], None]) -> None:
@@ -54,18 +51,9 @@ class SwapDesk:
         self._wishes.put(json.loads(line))
 
     def serve(self, model: Touchable, loop: Loop, limits: Limits, rehearsal: Rehearsal) -> None:
-        """Begin to work, in a thread of its own.
+        """Begin to work, in a thread of its own, for the `model` that `loop` answers with, before its first tick.
 
-        Parameters
-        ----------
-        model : Touchable
-            The body that `loop` answers with.
-        loop : Loop
-            Before its first tick.
-        limits : Limits
-            Of the loop.
-        rehearsal : Rehearsal
-            Which rehearses with another evaluator of the same body.
+        The `rehearsal` rehearses with another evaluator of the same body.
         """
         compile_blend()
         arguments = (model, loop, limits, rehearsal)

@@ -44,7 +44,7 @@ from palpate.units import Range
 __all__ = ["Verdict", "judge_timing", "main", "measure_timing", "run_timing_test"]
 
 _START = 60.0  # s that a child may take to start: the first start on a machine compiles the kernels
-_STIFFNESS = 100.0  # N/m
+_STIFFNESS = 100.0  # N/m, of the spring that stands for a body
 _GOOD, _USABLE = 0.1, 0.5  # of a period, the lateness at 99 %
 _MISSED = 1e-3  # share of the ticks that may be missed on a machine that is usable
 
@@ -81,14 +81,7 @@ def measure_timing(
 ) -> LoopReport:
     """Run the loop against a spring for a while, in this thread, and return its report.
 
-    Parameters
-    ----------
-    seconds : float
-        Duration, s, by `clock`.
-    rate : float
-        Ticks per second, Hz.
-    clock, sleep : callable
-        The loop's time and pause, s; a test winds them by hand.
+    It runs for `seconds` by `clock`, at `rate`, Hz; a test winds `clock` and `sleep`, s, by hand.
     """
     device, model, shared = "stroke", _SpringModel(), Shared.private()
     traits = device_traits(device)
@@ -112,24 +105,13 @@ def measure_timing(
 
 @dataclass(frozen=True)
 class Verdict:
-    """Judgement of a machine for a loop at one rate.
+    """Judgement of a machine for a loop at one rate."""
 
-    Attributes
-    ----------
-    grade : {"good", "usable", "not fit"}
-        In one word or two.
-    sentence : str
-        The grade as a sentence with the rate.
-    reasons : tuple of str
-        The figures that led to it, where it is not good, and then what on this machine may be their cause.
-    missed : float
-        Share of the ticks that were left out.
-    """
-
-    grade: str
-    sentence: str
+    grade: str  # good, usable or not fit
+    sentence: str  # the grade as a sentence with the rate
+    # the figures that led to it, where it is not good, and then what on this machine may be their cause
     reasons: tuple[str, ...]
-    missed: float
+    missed: float  # share of the ticks that were left out
 
 
 _SENTENCES = {
@@ -142,18 +124,9 @@ _SENTENCES = {
 def judge_timing(
     report: LoopReport, seconds: float, rate: float = 1000.0, checks: Sequence[Check] = ()
 ) -> Verdict:
-    """Return the verdict on a run of the loop.
+    """Return the verdict on a run of the loop that lasted `seconds`, s, at the `rate` asked for, Hz.
 
-    Parameters
-    ----------
-    report : LoopReport
-        Of that run.
-    seconds : float
-        Its duration, s.
-    rate : float
-        The ticks per second that were asked for, Hz.
-    checks : sequence of Check
-        The survey of the machine; a miss among them is named as a possible cause.
+    A miss among the `checks` of the machine is named as a possible cause.
     """
     period, wanted = 1.0 / rate, max(1, round(seconds * rate))
     missed = max(0.0, 1.0 - (report.ticks + 1) / wanted)  # the last tick may fall on the end
@@ -186,13 +159,7 @@ def _us(seconds: float) -> str:
 
 
 def run_timing_test(seconds: float, rate: float = 1000.0) -> LoopReport:
-    """Run the test in a process of its own, with the scheduling of the loop, and return its report.
-
-    Raises
-    ------
-    DeviceError
-        If the process fails.
-    """
+    """Run the test (seconds, Hz) in a process of its own, with the scheduling of the loop, and return its report."""
     command = [sys.executable, "-m", "palpate.runtime.timing_test", str(seconds), str(rate)]
     try:
         done = subprocess.run(

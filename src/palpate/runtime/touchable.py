@@ -38,27 +38,14 @@ _SLIVER = 1e-3  # of the deepest depth: shallower is no press
 
 @dataclass(frozen=True, eq=False)
 class Touchable:
-    """An energy that a hand can feel, with all that follows from it for that hand.
+    """An energy that a hand can feel, with all that follows from it for that hand."""
 
-    Attributes
-    ----------
-    energy : LearntEnergy
-        What the hand feels: force and stiffness, depth, trained region.
-    fields : mapping of name to FieldSurrogate or NodeField
-        What the eye sees; may be empty.
-    name : str
-        Of the body, as pages and reports call it.
-    memory : Memory, optional
-        What it remembers of how it was touched.
-    meta : mapping
-        What the file says of its making.
-    """
-
-    energy: Any
+    energy: Any  # what the hand feels, a LearntEnergy: force and stiffness, depth, trained region
+    # what the eye sees; may be empty
     fields: Mapping[str, FieldSurrogate | NodeField] = field(default_factory=dict)
-    name: str = "body"
-    memory: Memory | None = None
-    meta: Mapping[str, Any] = field(default_factory=dict)
+    name: str = "body"  # of the body, as pages and reports call it
+    memory: Memory | None = None  # what it remembers of how it was touched
+    meta: Mapping[str, Any] = field(default_factory=dict)  # what the file says of its making
 
     def __str__(self) -> str:
         return f"Touchable {self.name}: {self.energy}"
@@ -132,10 +119,7 @@ class Touchable:
     def trained_inputs(self) -> np.ndarray:
         """Inputs (N, n) where the hand feels something, inside the trained region: random ones, and those learnt from.
 
-        Raises
-        ------
-        UsageError
-            If there is none.
+        A body that has none is a UsageError.
         """
         X = self.energy.trained_rows()
         if self.holds:  # what is held is stiffest and goes farthest at the ends
@@ -278,28 +262,15 @@ class Touchable:
         return np.concatenate(offsets)
 
     def workspace(self, radius: float) -> Workspace:
-        """Return how a hand's workspace of `radius` (m) lies about the body.
-
-        Parameters
-        ----------
-        radius : float
-            Of the sphere that the device reaches, m.
-        """
+        """Return how a hand's workspace, the sphere of `radius` (m) that the device reaches, lies about the body."""
         x, y, z = self.home.tolist()
         return Workspace.for_reach(radius, self.reach, centre=(x, y, z), upright=self.upright)
 
     def stroke(self, scale: float) -> dict[str, float]:
         """Return amplitude (m) and direction, in device coordinates, of a stroke to three quarters of `deepest`.
 
-        Parameters
-        ----------
-        scale : float
-            Metres of body per metre of hand.
-
-        Returns
-        -------
-        dict of float
-            ``amplitude``, ``x``, ``y``, ``z``; empty where a hand holds, which the device's own stroke displaces.
+        They lie under ``amplitude``, ``x``, ``y`` and ``z``; there are none where a hand holds, which the device's own
+        stroke displaces. `scale` is metres of body per metre of hand.
         """
         if self.holds:
             return {}
@@ -308,15 +279,7 @@ class Touchable:
 
 
 def touchable(model: Surrogate, name: str = "") -> Touchable:
-    """Return a learnt body as a hand finds it.
-
-    Parameters
-    ----------
-    model : Surrogate
-        The learnt body.
-    name : str
-        Its name where its own record has none.
-    """
+    """Return a learnt body as a hand finds it, under `name` where its own record has none."""
     known = str(model.meta.get("name", "")) or name or "body"
     if (touches := correction_count(model.meta)) is not None:
         known += f", corrected by {touches} touches" + (
@@ -326,17 +289,6 @@ def touchable(model: Surrogate, name: str = "") -> Touchable:
 
 
 def load_touchable(path: str | os.PathLike[str]) -> Touchable:
-    """Read a learnt body that can be touched from its file.
-
-    Parameters
-    ----------
-    path : path
-        A file that a learnt body was saved to; its stem names a body whose own record has no name.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is missing, corrupt, foreign, or of something that no hand can be laid on.
-    """
+    """Read a learnt body that can be touched from its file, whose stem names a body whose own record has no name."""
     path = Path(path)
     return touchable(Surrogate.load(path), path.stem)

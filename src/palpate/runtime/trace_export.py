@@ -83,14 +83,7 @@ def trace_table(trace: Trace) -> dict[str, np.ndarray]:
 def export_trace(trace: Trace, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Write a trace as a table; the file's ending says in which of `FORMATS`.
 
-    A file that exists is replaced where `overwrite` is True.
-
-    Raises
-    ------
-    UsageError
-        If the ending is another one, the file exists, or pyarrow is missing for Parquet.
-    ResourceError
-        If the disk is full or write-protected.
+    A file that exists is replaced where `overwrite` is True. Parquet needs pyarrow.
     """
     target = Path(path)
     write = FORMATS.get(target.suffix)
@@ -113,9 +106,8 @@ def _write_csv(trace: Trace, path: Path) -> None:
     with open(path, "w", encoding="utf-8", newline="\n") as file:
         file.write(head + "\n")
         for row in zip(*columns, strict=True):
-            file.write(
-                ",".join(map(repr, row)) + "\n"
-            )  # repr: the shortest text that reads back to the same bits
+            # repr: the shortest text that reads back to the same bits
+            file.write(",".join(map(repr, row)) + "\n")
 
 
 def _write_npz(trace: Trace, path: Path) -> None:

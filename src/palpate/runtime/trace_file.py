@@ -53,26 +53,10 @@ _MOST_ENTRIES, _LARGEST = 0xFFFF, 0xFFFFFFFF  # for which an archive can have a 
 
 
 class TraceWriter:
-    """Writes a trace, chunk by chunk; whatever was written before a crash can be read.
+    """Writes a trace into a new file, chunk by chunk; whatever was written before a crash can be read.
 
-    Parameters
-    ----------
-    path : path
-        A new file.
-    header : mapping
-        What was touched and how, as JSON takes it.
-
-    Attributes
-    ----------
-    size : int
-        Bytes so far.
-
-    Raises
-    ------
-    UsageError
-        If the file exists, or its folder doesn't.
-    ResourceError
-        If the disk is full or the folder write-protected. The other methods raise it too.
+    The header says what was touched and how, as JSON takes it; `size` is the bytes so far. Every method raises a
+    ResourceError where the disk is full or the folder write-protected.
     """
 
     def __init__(self, path: str | os.PathLike[str], header: Mapping[str, Any]) -> None:
@@ -156,36 +140,16 @@ class TraceWriter:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """A recorded touch.
+    """A recorded touch."""
 
-    Attributes
-    ----------
-    path : Path
-        Its file.
-    header : mapping
-        What was touched, by which device, at which rate and limits.
-    ticks : (N,) of dtype `TICK`
-        In order of time.
-    state : mapping, optional
-        What the loop remembered as the recording began; None where that was not kept.
-    events : tuple of mappings
-        Each with ``tick`` and ``kind``.
-    end : mapping, optional
-        How it ended; None where the file ends too early.
-    size : int
-        Bytes of the file.
-    notes : tuple of str
-        What is missing, in words.
-    """
-
-    path: Path
-    header: Mapping[str, Any]
-    ticks: np.ndarray
-    state: Mapping[str, Any] | None = None
-    events: tuple[Mapping[str, Any], ...] = ()
-    end: Mapping[str, Any] | None = None
-    size: int = 0
-    notes: tuple[str, ...] = field(default=())
+    path: Path  # its file
+    header: Mapping[str, Any]  # what was touched, by which device, at which rate and limits
+    ticks: np.ndarray  # (N,) of dtype `TICK`, in order of time
+    state: Mapping[str, Any] | None = None  # what the loop remembered as the recording began; None: not kept
+    events: tuple[Mapping[str, Any], ...] = ()  # each with `tick` and `kind`
+    end: Mapping[str, Any] | None = None  # how it ended; None where the file ends too early
+    size: int = 0  # bytes of the file
+    notes: tuple[str, ...] = field(default=())  # what is missing, in words
 
     def __len__(self) -> int:
         return len(self.ticks)
@@ -228,19 +192,10 @@ class Trace:
 
 
 def read_trace(path: str | os.PathLike[str]) -> Trace:
-    """Read a recorded touch; what is missing or damaged is left out, with a note.
+    """Read a recorded touch, as `palpate run --record` writes it; what is missing or damaged is left out, with a note.
 
-    Parameters
-    ----------
-    path : path
-        As `palpate run --record` writes it.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is missing, is no recording, is of a later version, or is damaged throughout.
-    ResourceError
-        If its ticks take more than half of the memory that is free.
+    A FileFormatError says that the file is missing, is no recording, is of a later version, or is damaged throughout; a
+    ResourceError that its ticks take more than half of the memory that is free.
     """
     import psutil
 

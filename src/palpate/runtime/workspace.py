@@ -22,7 +22,7 @@ __all__ = ["PLAIN_AXES", "Axes", "HandFrame", "Workspace"]
 
 Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 PLAIN_AXES: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_ROUNDING = 1e-9  # of a rotation's entries
+_ROUNDING = 1e-9  # largest error of R Rᵀ = 1 in a rotation
 
 _USED = 0.8  # share of the radius that the trained reach takes: the rest shows that the range has an end
 
@@ -110,22 +110,10 @@ class Workspace:
 
 
 class HandFrame:
-    """A device's own axes and the clutch.
+    """A device's own axes and the clutch, which leaves the `offset` (3,), m, that is added to the turned position.
 
-    Parameters
-    ----------
-    axes : (3, 3) floats, row by row
-        Turns a vector of the device into x right, y up, z towards the user; a rotation.
-
-    Attributes
-    ----------
-    offset : (3,)
-        Added to the turned position, m; what the clutch has left.
-
-    Raises
-    ------
-    UsageError
-        If the matrix mirrors, stretches or shears.
+    `axes` (3, 3), row by row, is a rotation that turns a vector of the device into x right, y up, z towards the user; a
+    matrix that mirrors, stretches or shears is refused.
     """
 
     def __init__(self, axes: Axes = PLAIN_AXES) -> None:

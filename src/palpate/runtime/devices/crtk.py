@@ -61,33 +61,22 @@ _GRAVITY, _LOCK, _UNLOCK, _LOCKED = (
 )
 _ECHOES = 20  # messages, of whose round trips the median counts
 _RESOLUTION = 6e-5  # m: none is published, the coarsest of all devices is taken
-_FIRST, _FASTEST, _REACH = 50, 1.0, 0.3  # poses that are checked and thrown away, m/s, m from the first one
+# poses at the start that are checked and thrown away: no faster than this, m/s, nor farther from the first one, m
+_FIRST, _FASTEST, _REACH = 50, 1.0, 0.3
 _ASKS = 5  # times that a limp arm is asked to hold its wrist
 _AGAIN = 0.05  # s after which a force is sent again
-_DRIFT = 2e-4  # by which two clocks may part: four times what a bad crystal does
+_DRIFT = 2e-4  # s/s by which two clocks may run apart: four times what a bad crystal does
 _DAMPING = 0.5  # N·s/m, assumed
-_ROUNDING = 0.01  # of the size of an orientation
+_ROUNDING = 0.01  # by which the length of an orientation's quaternion may differ from 1
 
 
 class CrtkDevice:
-    """One arm behind the bridge.
+    """One arm behind the bridge; its traits have the radius and force of the settings and the measured delay.
 
-    Attributes
-    ----------
-    traits : Traits
-        With the radius and force of the settings and the measured delay.
-    types : {"ros1", "ros2"}
-        Spelling of types in use.
-    round_trip : float
-        Measured through the bridge, s.
-    repeated : int
-        Positions whose stamp was not newer than the last one's.
-    published : int
-        Wrenches sent.
-    operating : str
-        State that the arm reports.
-    locked : bool or None
-        Whether the arm says that it holds its orientation; None where it says nothing.
+    `types` is the spelling of types in use, "ros1" or "ros2"; `round_trip` the time measured through the bridge, s;
+    `repeated` counts positions whose stamp was not newer than the last one's, `published` the wrenches sent;
+    `operating` is the state that the arm reports; `locked` says whether it holds its orientation, None where it says
+    nothing.
     """
 
     traits: ClassVar[Traits] = Traits(

@@ -18,25 +18,15 @@ from palpate.runtime.devices.device import Sample
 __all__ = ["PEDALS", "Pedals"]
 
 PEDALS = ("clutch", "coag", "bicoag", "camera", "cam_minus", "cam_plus")
-_PRESSED, _TAPPED = 1, 2
+_PRESSED, _TAPPED = 1, 2  # what a pedal's message says; 0: let go
 
 
 class Pedals:
-    """The pedals of one console.
+    """The pedals of one console, in a namespace that is empty where those without one count.
 
-    Parameters
-    ----------
-    namespace : str
-        Of the pedals; empty for none of those that are named without one.
-    clutch, dead_man, hold : str
-        Pedals of these meanings, by name, or by topic with a slash; empty for none. All others are buttons that stop.
-
-    Attributes
-    ----------
-    topics : tuple of str
-        Of all pedals, with a leading slash.
-    buttons : int
-        How many of them are buttons, the dead-man pedal first.
+    `clutch`, `dead_man` and `hold` give pedals of these meanings, by name, or by topic with a slash; empty for none.
+    All others are buttons that stop. `topics` has those of all pedals, with a leading slash; `buttons` counts the
+    buttons, the dead-man pedal first.
     """
 
     def __init__(self, namespace: str, clutch: str, dead_man: str, hold: str) -> None:
@@ -57,13 +47,7 @@ class Pedals:
         self._tapped = 0
 
     def take(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Take a pedal's message.
-
-        Raises
-        ------
-        DeviceError
-            If it has no button.
-        """
+        """Take a pedal's message; one that has no button is a DeviceError."""
         buttons = message.get("buttons") or ()
         if not buttons or buttons[0] not in {0, _PRESSED, _TAPPED}:
             raise DeviceError(f"The pedal {topic} sends no button, but {str(message)[:100]}.")

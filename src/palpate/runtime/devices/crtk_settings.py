@@ -41,70 +41,33 @@ TYPES = {
 
 @dataclass(frozen=True)
 class CrtkSettings:
-    """Settings of the connection.
+    """Settings of the connection."""
 
-    Attributes
-    ----------
-    url : str
-        Address of the ROS bridge.
-    arm : str
-        Namespace of the arm, such as MTMR; empty for none.
-    wrench : {"body/servo_cf", "servo_cf"}
-        Topic of the force.
-    types : {"auto", "ros1", "ros2"}
-        Spelling of types: ``geometry_msgs/PoseStamped`` or ``geometry_msgs/msg/PoseStamped``; "auto" tries both.
-    axes : str
-        Where right, up and towards the user lie in the axes of the arm's base, such as -y+z-x.
-    origin : {"here", "base"}
-        Centre of the workspace: where the handle is while it is opened, or the arm's own origin.
-    radius : float
-        Workspace, m.
-    force : float
-        Largest force, N.
-    delay : float
-        Round trip through the bridge, s; negative measures it.
-    state : float
-        0 does without the arm's operating state.
-    enable, home : float
-        1 lets the driver enable an arm, and home it: it moves by itself.
-    gravity : float
-        1 asks the arm to bear its own weight; 0 leaves that as it is.
-    lock : float
-        1 asks an arm whose wrist is passive under a force to hold its orientation, as it is while it is opened.
-    pedals : str
-        Namespace of the console's pedals; empty for none.
-    clutch : str
-        Pedal that lets the handle move alone; empty for none.
-    dead_man : str
-        Pedal that is the first button, the dead-man button where one is asked for; empty for none.
-    hold : str
-        Pedal that holds the body while it is pressed; empty: the hand always holds it. All other pedals stop the force.
-    wait : float
-        Longest wait of a tick for a position, s.
-    search : float
-        Time to wait for the arm while opening, s.
-    """
-
-    url: str = "ws://localhost:9090"
-    arm: str = ""
-    wrench: str = "body/servo_cf"
+    url: str = "ws://localhost:9090"  # address of the ROS bridge
+    arm: str = ""  # namespace of the arm, such as MTMR; empty for none
+    wrench: str = "body/servo_cf"  # topic of the force, one of `WRENCHES`
+    # ros1 spells geometry_msgs/PoseStamped, ros2 geometry_msgs/msg/PoseStamped; auto tries both
     types: str = "auto"
-    axes: str = "-y+z-x"
+    axes: str = "-y+z-x"  # where right, up and towards the user lie in the axes of the arm's base
+    # centre of the workspace: where the handle is while it is opened; base: the arm's own origin
     origin: str = "here"
-    radius: float = 0.05
-    force: float = 3.0
-    delay: float = -1.0
-    state: float = 1.0
-    enable: float = 0.0
-    home: float = 0.0
-    gravity: float = 1.0
+    radius: float = 0.05  # m, of the workspace
+    force: float = 3.0  # N, the largest
+    delay: float = -1.0  # s, round trip through the bridge; negative measures it
+    state: float = 1.0  # 0 does without the arm's operating state
+    enable: float = 0.0  # 1 lets the driver enable the arm
+    home: float = 0.0  # 1 lets the driver home the arm: it moves by itself
+    gravity: float = 1.0  # 1 asks the arm to bear its own weight; 0 leaves that as it is
+    # 1 asks an arm whose wrist is passive under a force to hold its orientation, as it is while it is opened
     lock: float = 1.0
-    pedals: str = "footpedals"
-    clutch: str = "clutch"
+    pedals: str = "footpedals"  # namespace of the console's pedals; empty for none
+    clutch: str = "clutch"  # pedal that lets the handle move alone; empty for none
+    # pedal that is the first button, the dead-man button where one is asked for; empty for none
     dead_man: str = "coag"
+    # pedal that holds the body while pressed; empty: the hand always holds it. All other pedals stop the force
     hold: str = ""
-    wait: float = 0.0
-    search: float = 2.0
+    wait: float = 0.0  # s, longest wait of a tick for a position
+    search: float = 2.0  # s to wait for the arm while opening
 
     def __post_init__(self) -> None:
         words = (
@@ -147,13 +110,7 @@ class CrtkSettings:
 
 
 def axes_in_words(text: str) -> Axes:
-    """Return the rotation of three signed letters: where right, up and towards the user lie in the arm's axes.
-
-    Raises
-    ------
-    UsageError
-        If they are no rotation.
-    """
+    """Return the rotation of three signed letters: where right, up and towards the user lie in the arm's axes."""
     rows = np.zeros((3, 3))
     good = len(text) == 6 and all(text[k] in "+-" and text[k + 1] in "xyz" for k in (0, 2, 4))
     for k in range(3 if good else 0):

@@ -38,33 +38,15 @@ _STATES = {"enable": "ENABLED", "disable": "DISABLED", "pause": "PAUSED", "resum
 
 @dataclass(frozen=True)
 class CrtkSimulatorSettings(HandSettings):
-    """Settings of the bridge, the arm and its hand.
+    """Settings of the bridge, the arm and its hand."""
 
-    Attributes
-    ----------
-    port : int
-        Of the bridge; 0 takes a free one.
-    host : str
-        Address to listen at.
-    arm : str
-        Namespace.
-    rate : float
-        Positions per second, Hz.
-    ros : {1, 2}
-        Version of ROS, and so the spelling of types and stamps.
-    weight : float
-        Of the limp arm, N.
-    silence : float
-        Time without a wrench after which the force lapses, s; CRTK doesn't promise that it ever does.
-    """
-
-    silence: float = 1e9
-    weight: float = 2.0
-    port: int = 9090
+    silence: float = 1e9  # s without a wrench until the force lapses; CRTK doesn't promise that it ever does
+    weight: float = 2.0  # N, of the limp arm
+    port: int = 9090  # of the bridge; 0 takes a free one
     host: str = "127.0.0.1"
-    arm: str = "arm"
-    rate: float = 1000.0
-    ros: int = 2
+    arm: str = "arm"  # namespace
+    rate: float = 1000.0  # Hz, of positions
+    ros: int = 2  # 1 or 2: version of ROS, and so the spelling of types and stamps
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -76,79 +58,32 @@ class CrtkSimulatorSettings(HandSettings):
 
 @dataclass
 class CrtkFaults:
-    """Faults of the chain, switched while it runs.
+    """Faults of the chain, switched while it runs."""
 
-    Attributes
-    ----------
-    held : bool
-        Positions are kept back until this is false again; then all are sent.
-    dropped, doubled : int
-        Number of the next positions that are lost, or sent twice.
-    swapped : int
-        Number of the next positions that are sent after their successor.
-    closing : bool
-        The next message closes the connection.
-    deaf : bool
-        What is published to the bridge is not passed on: no echo.
-    stampless : bool
-        Headers have stamps of zero.
-    stateless : bool
-        There is no operating state.
-    complaint : str
-        Sent once, as an error of the bridge.
-    runaway : float
-        By how much each reported position is higher than the last, m, beside the hand's own motion.
-    position : three floats, optional
-        Position that is reported instead of the hand's, m; NaN is written as null.
-    """
-
-    held: bool = False
-    dropped: int = 0
-    doubled: int = 0
-    swapped: int = 0
-    closing: bool = False
-    deaf: bool = False
-    stampless: bool = False
-    stateless: bool = False
-    complaint: str = ""
+    held: bool = False  # positions are kept back until this is false again; then all are sent
+    dropped: int = 0  # number of the next positions that are lost
+    doubled: int = 0  # number of the next positions that are sent twice
+    swapped: int = 0  # number of the next positions that are sent after their successor
+    closing: bool = False  # the next message closes the connection
+    deaf: bool = False  # what is published to the bridge is not passed on: no echo
+    stampless: bool = False  # headers have stamps of zero
+    stateless: bool = False  # there is no operating state
+    complaint: str = ""  # sent once, as an error of the bridge
+    # m by which each reported position is higher than the last, beside the hand's own motion
     runaway: float = 0.0
+    # m, reported instead of the hand's; NaN is written as null
     position: tuple[float, float, float] | None = None
 
 
 class CrtkSimulator(ServiceDouble):
-    """The bridge and the arm.
+    """The bridge and the arm, which move and stamp positions by the time, s, that `clock` returns.
 
-    Parameters
-    ----------
-    settings : CrtkSimulatorSettings, optional
-        Port, arm, rate, hand.
-    clock : callable
-        Returns the time, s, by which the hand moves and positions are stamped.
-
-    Attributes
-    ----------
-    faults : CrtkFaults
-        What goes wrong; may be changed at any time.
-    state, homed, busy : str, bool, bool
-        Operating state of the arm.
-    port : int
-        In use, once started.
-    wrenches : int
-        Wrenches that have arrived.
-    stamp : dict
-        Stamp of the newest wrench's header.
-    topics : dict of str to str
-        Topics that are advertised to the bridge, with their types.
-    absolute : bool
-        Whether wrenches are in the axes of the base.
-    limp : bool
-        Whether a wrench has come, after which nothing but wrenches moves the arm.
-    gravity : bool
-        Whether the arm bears its own weight.
-    locked : dict or None
-        Orientation that the wrist holds; None where it swings.
-    received : dict of str to dict
-        Latest message of each topic that was published.
+    `faults` may be changed at any time. `state`, `homed` and `busy` are the arm's operating state, `port` is in use
+    once started, `wrenches` counts those that have arrived, `stamp` is that of the newest one's header, `absolute` says
+    whether they are in the axes of the base, and `limp` whether one has come, after which nothing but wrenches moves
+    the arm. `gravity` says whether the arm bears its own weight; `locked` is the orientation that the wrist holds, None
+    where it swings. `topics` maps those advertised to the bridge to their types, `received` each published topic to its
+    latest message.
     """
 
     def __init__(

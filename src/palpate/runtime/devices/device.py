@@ -158,14 +158,8 @@ class Device(Protocol):
 def free_buttons(pressed: int, own: int) -> int:
     """Return the bits of the buttons that are left when one is the driver's own: those above it move down.
 
-    So the first of the others is the dead-man button, whichever the driver has taken.
-
-    Parameters
-    ----------
-    pressed : int
-        One bit for each button.
-    own : int
-        Place of the driver's button, counted from 0; negative for none.
+    So the first of the others is the dead-man button, whichever the driver has taken. `own` counts from 0; negative for
+    none.
     """
     if own < 0:
         return pressed
@@ -177,13 +171,7 @@ _Settings = TypeVar("_Settings")
 
 
 def settings_from(kind: type[_Settings], options: Mapping[str, str]) -> _Settings:
-    """Build a device's settings dataclass, whose fields are numbers or words, from texts.
-
-    Raises
-    ------
-    UsageError
-        If an option is unknown or not a number.
-    """
+    """Build a device's settings dataclass, whose fields are numbers or words, from texts."""
     defaults = {f.name: f.default for f in fields(kind)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     for name, text in options.items():

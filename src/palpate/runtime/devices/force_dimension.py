@@ -49,7 +49,7 @@ WATCHDOG = 160  # times 125 µs: 20 ms without a force command, and the firmware
 _DAMPING = 0.5  # N·s/m, assumed
 _DELAY = 0.00025  # s: one exchange at the 4 kHz of the link
 _BUTTONS, _MASK = 8, 0xFF  # bits of the mask that are looked at; most devices have one button
-_FIRST, _STEP, _FASTEST = 100, 0.001, 1.0  # samples at the start, s between them, m/s
+_FIRST, _STEP, _FASTEST = 100, 0.001, 1.0  # samples at the start, s between them; faster is an error, m/s
 _TOLERANCE = 1.01  # of the force limit that is read back
 _LOOK, _REST = 0.005, 0.5  # s between looks at the status; s of zero force before forces come back
 _BY_HAND = 4000  # looks, 20 s, until a hand has homed a Falcon
@@ -58,33 +58,16 @@ _RETURNING, _BY_THE_USER = frozenset((2, 3)), frozenset((1, 6))  # causes of for
 
 @dataclass(frozen=True)
 class ForceDimensionSettings:
-    """Settings of the connection.
+    """Settings of the connection."""
 
-    Attributes
-    ----------
-    serial : float
-        Serial number of the device; 0 takes the only one.
-    library : str
-        File of the vendor's library; empty looks for it.
-    simulator : float
-        1 lets the vendor's own simulator on this machine count as a device.
-    home : float
-        1 lets a device that needs it home itself: it moves by itself.
-    gravity : float
-        0 turns the compensation of the handle's weight off.
-    mass : float
-        Mass of what is mounted on the handle, kg; negative keeps the device's own value.
-    clutch : float
-        Button, counted from 0, that works as a clutch; -1 for none. Of the others the first is the dead-man button
-        where one is asked for, and each stops the force else.
-    """
-
-    serial: float = 0.0
-    library: str = ""
-    simulator: float = 0.0
-    home: float = 0.0
-    gravity: float = 1.0
-    mass: float = -1.0
+    serial: float = 0.0  # number of the device; 0 takes the only one
+    library: str = ""  # file of the vendor's library; empty looks for it
+    simulator: float = 0.0  # 1 lets the vendor's own simulator on this machine count as a device
+    home: float = 0.0  # 1 lets a device that needs it home itself: it moves by itself
+    gravity: float = 1.0  # 0 turns the compensation of the handle's weight off
+    mass: float = -1.0  # kg, mounted on the handle; negative keeps the device's own value
+    # button, counted from 0, that works as a clutch; -1 for none. Of the others the first is the dead-man button where
+    # one is asked for, and each stops the force else
     clutch: float = -1.0
 
     def __post_init__(self) -> None:
@@ -102,24 +85,12 @@ class ForceDimensionSettings:
 
 
 class ForceDimensionDevice:
-    """One device behind the vendor's library.
+    """One device behind the vendor's library; its traits are its profile's, and where it states a smaller force, that.
 
-    Attributes
-    ----------
-    traits : Traits
-        Of the opened device: its profile, and where the device states a smaller force, that.
-    profile : DeviceProfile
-        The profile that its type has.
-    name : str
-        Its name and serial number.
-    left_handed : bool
-        Whether it is built for the left hand; its translations have the same axes.
-    watchdog : bool
-        Whether its firmware watches over the force commands.
-    guarded : int
-        Readings that came too soon and repeated old values.
-    saturations : int
-        Forces of which a motor gave less, in the same direction.
+    `profile` is that of its type; `name` has its serial number. `left_handed` says whether it is built for the left
+    hand; its translations have the same axes. `watchdog` says whether its firmware watches over the force commands.
+    `guarded` counts readings that came too soon and repeated old values, `saturations` forces of which a motor gave
+    less, in the same direction.
     """
 
     traits: ClassVar[Traits] = Traits(

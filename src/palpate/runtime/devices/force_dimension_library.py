@@ -112,18 +112,7 @@ class Status:
 
 
 class DhdLibrary(VendorLibrary):
-    """The library's functions, with their types, as attributes.
-
-    Parameters
-    ----------
-    library : ctypes.CDLL
-        As loaded.
-
-    Raises
-    ------
-    DeviceError
-        If a function is missing.
-    """
+    """The library's functions, with their types, as attributes; one that is missing is a DeviceError."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
         super().__init__(
@@ -136,17 +125,9 @@ class DhdLibrary(VendorLibrary):
         return int(self.dhdErrorGetLast()), text.decode("utf-8", "replace") if text else "no words"
 
     def call(self, name: str, *arguments: Any, optional: bool = False) -> bool:
-        """Call a function that returns 0 or fails; outside the loop.
+        """Call a function that returns 0 or fails, outside the loop; a failure is a DeviceError in the library's words.
 
-        Returns
-        -------
-        bool
-            False where `optional` and this device doesn't have that.
-
-        Raises
-        ------
-        DeviceError
-            If it fails, with the library's words.
+        The answer is False where the call is `optional` and this device doesn't have that.
         """
         code = getattr(self, name)(*arguments)
         if code == 0:

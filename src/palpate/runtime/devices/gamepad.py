@@ -33,7 +33,7 @@ _SYN, _KEY, _ABS, _FF = 0, 1, 3, 0x15
 _DROPPED, _REPORT = 3, 0  # of _SYN: events were lost; a set of events is complete
 _X, _Y, _Z, _RX, _RY, _RZ, _GAS, _BRAKE = 0, 1, 2, 3, 4, 5, 9, 10
 _SOUTH, _EAST, _START, _LEFT_STICK = 0x130, 0x131, 0x13B, 0x13D
-_RUMBLE, _FULL = 0x50, 0xFFFF
+_RUMBLE, _FULL = 0x50, 0xFFFF  # kind of effect, and its largest magnitude
 
 _MOST_EVENTS = 256  # in one tick: more than any pad sends
 _RENEWED, _LASTING = 0.050, 100  # s between rumble effects, ms that each lasts
@@ -43,33 +43,16 @@ _WEAKEST = 0.01  # of full: less is no rumble
 
 @dataclass(frozen=True)
 class GamepadSettings:
-    """Settings of the gamepad.
+    """Settings of the gamepad."""
 
-    Attributes
-    ----------
-    path : str
-        Its event file, such as ``/dev/input/event7``; empty takes the only gamepad.
-    mapping : {"position", "speed"}
-        What a stick sets of the hand.
-    depth : {"stick", "triggers"}
-        What moves the hand away from the user and back.
-    hold : {"always", "button"}
-        Whether the hand holds the body always, or while the lower button (A, cross) is pressed.
-    dead : float
-        Dead zone, as a share of the stick's way; where the pad's own is larger, that counts.
-    speed : float
-        Of the hand at full stick, m/s, where the mapping is speed.
-    rumble : float
-        0 does without rumble.
-    """
-
-    path: str = ""
-    mapping: str = "position"
-    depth: str = "stick"
+    path: str = ""  # event file, such as /dev/input/event7; empty takes the only gamepad
+    mapping: str = "position"  # position or speed: what a stick sets of the hand
+    depth: str = "stick"  # stick or triggers: what moves the hand away from the user and back
+    # always, or button: the hand holds the body while the lower button (A, cross) is pressed
     hold: str = "always"
-    dead: float = 0.15
-    speed: float = 0.08
-    rumble: float = 1.0
+    dead: float = 0.15  # dead zone, as a share of the stick's way; where the pad's own is larger, that counts
+    speed: float = 0.08  # m/s of the hand at full stick, where the mapping is speed
+    rumble: float = 1.0  # 0 does without rumble
 
     def __post_init__(self) -> None:
         words = (self.mapping, self.depth, self.hold)
@@ -85,15 +68,7 @@ class GamepadSettings:
 
 
 class GamepadDevice:
-    """One gamepad.
-
-    Attributes
-    ----------
-    name : str
-        As the kernel calls it.
-    rumbles : bool
-        Whether it has motors that this program may turn on.
-    """
+    """One gamepad, with its name in the kernel; `rumbles` where it has motors that this program may turn on."""
 
     traits: ClassVar[Traits] = Traits(
         0.075,

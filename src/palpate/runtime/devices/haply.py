@@ -51,7 +51,7 @@ _PRESET = "arm_front_centered"  # the origin in the middle of the reach
 _GOODBYE = 0.05  # s for each of the two answers that may be outstanding at the end
 _LOST = 0.010  # s after which an answer counts as lost
 _PROOF, _PROVING_FORCE = 50, 0.05  # commands of more than that many N until an echo is missed
-_FIRST, _FASTEST = 50, 1.0  # samples that are checked and thrown away, m/s
+_FIRST, _FASTEST = 50, 1.0  # samples at the start that are checked and thrown away; faster is an error, m/s
 _REACH, _IMPOSSIBLE = 0.5, 3  # m from the centre that no arm reaches; samples in a row until that is an error
 _DAMPING = 0.5  # N·s/m, assumed
 _BUTTONS = 4  # of the grip that has the most
@@ -63,48 +63,26 @@ _STOPS = frozenset(
 
 @dataclass(frozen=True)
 class HaplySettings:
-    """Settings of the connection.
+    """Settings of the connection."""
 
-    Attributes
-    ----------
-    url : str
-        Address of the simulation channel.
-    device : str
-        Four-digit id of the device; empty takes the only one.
-    http : float
-        Port of the service's HTTP interface; 0 tries that of the channel, as of version 3.5, then 10000.
-    events : float
-        Port of the event channel, as of version 3.5; 0 does without the service's safety events.
-    spelling : {"auto", "vector", "values"}
-        How a force is written; "auto" finds it out by the echoed force.
-    scale : {"refuse", "compensate"}
-        Answer to a service that scales forces by a factor other than 1.
-    force_scale : float
-        Factor of a service that doesn't tell it, as before version 3.5; 0 refuses such a service. What the service
-        tells goes before.
-    grip : str
-        Id of the grip whose buttons count; empty: those of all.
-    hold : str
-        Button that is the hand, such as a of a wireless grip or button of a wired one: it holds the body only while
-        the button is pressed. Empty: it always holds. Of the others the first is the dead-man button where one is
-        asked for.
-    wait : float
-        Longest wait for an outstanding answer, s.
-    search : float
-        Time to look for a device, s.
-    """
-
-    url: str = "ws://localhost:10001"
-    device: str = ""
+    url: str = "ws://localhost:10001"  # address of the simulation channel
+    device: str = ""  # four-digit id of the device; empty takes the only one
+    # port of the service's HTTP interface; 0 tries that of the channel, as of version 3.5, then 10000
     http: float = 0.0
+    # port of the event channel, as of version 3.5; 0 does without the service's safety events
     events: float = 10020.0
-    spelling: str = "auto"
+    spelling: str = "auto"  # of a force: vector, values, or auto, which finds it out by the echoed force
+    # refuse or compensate: answer to a service that scales forces by a factor other than 1
     scale: str = "refuse"
+    # factor of a service that doesn't tell it, as before version 3.5; 0 refuses such a service. What the service tells
+    # goes before
     force_scale: float = 0.0
-    grip: str = ""
+    grip: str = ""  # id of the grip whose buttons count; empty: those of all
+    # button that is the hand, such as a of a wireless grip or button of a wired one: it holds the body only while the
+    # button is pressed. Empty: it always holds. Of the others the first is the dead-man button where one is asked for
     hold: str = ""
-    wait: float = 0.0002
-    search: float = 2.0
+    wait: float = 0.0002  # s, longest wait for an outstanding answer
+    search: float = 2.0  # s to look for a device
 
     def __post_init__(self) -> None:
         if self.spelling not in {"auto", *SPELLINGS} or self.scale not in {"refuse", "compensate"}:
@@ -124,22 +102,10 @@ class HaplySettings:
 class HaplyDevice:
     """One Inverse3, Inverse3x or Minverse behind the service.
 
-    Attributes
-    ----------
-    traits : Traits
-        Of the opened device: those of its profile, with as many buttons as its grips have.
-    profile : DeviceProfile
-        The profile that its type has.
-    note : str
-        What was taken on trust when it was opened, as sentences; empty for nothing.
-    spelling : str
-        The spelling of forces in use.
-    proven : bool
-        Whether an echoed force has shown that the service takes it.
-    lost, surplus : int
-        Answers that never came, and frames that nobody asked for.
-    wait : float
-        Longest wait of `read` for an outstanding answer, s.
+    Its traits are those of the profile of its type, with as many buttons as its grips have. `note` says in sentences
+    what was taken on trust when it was opened; empty for nothing. `spelling` is that of forces in use, and `proven`
+    says whether an echoed force has shown that the service takes it. `lost` counts answers that never came, `surplus`
+    frames that nobody asked for; `wait` is the longest wait of `read` for an outstanding answer, s.
     """
 
     traits: ClassVar[Traits] = Traits(

@@ -31,12 +31,8 @@ __all__ = [
 
 OLD_HTTP_PORT = 10000  # of the HTTP interface before version 3.5
 _GRIPS = ("verse_grip", "wireless_verse_grip", "custom_verse_grip")
-_SCALE = (
-    "data",
-    "value",
-    "force_scale",
-    "devices/force_scale",
-)  # where an answer holds the scale, outermost first
+# keys under which an answer holds the scale, outermost first
+_SCALE = ("data", "value", "force_scale", "devices/force_scale")
 
 
 def decode_frame(text: str) -> Mapping[str, Any]:
@@ -95,10 +91,7 @@ def read_buttons(grip: Mapping[str, Any]) -> dict[str, bool]:
 def read_scale(answer: Any) -> float:
     """Return the number in the service's answer on its scale: alone, in its envelope, or in an object.
 
-    Raises
-    ------
-    LookupError, TypeError
-        If the answer has none.
+    An answer that has none raises LookupError or TypeError.
     """
     while isinstance(answer, Mapping):
         if answer.get("ok") is False:

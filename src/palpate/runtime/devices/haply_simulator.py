@@ -51,31 +51,17 @@ EVENTS = {
 
 @dataclass(frozen=True)
 class SimulatorSettings(HandSettings):
-    """Settings of the service and its hand.
+    """Settings of the service and its hand."""
 
-    Attributes
-    ----------
-    port, events, legacy : int
-        Ports of the simulation channel with HTTP, of the events, and of the format of version 3.0; 0 takes a free one.
-    host : str
-        Address to listen at.
-    spellings : tuple of str
-        Spellings of a force that are understood; any other is ignored in silence.
-    force_scale : float
-        Factor on every force.
-    kind : str
-        Type of the devices: inverse3, inverse3x, minverse, or one that nobody knows.
-    grip : {"wireless", "wired", "both", "none"}
-        Grips that are connected. A wired one has one button, ``button``; a wireless one has a, b and c.
-    """
-
-    port: int = 10001
-    events: int = 10020
-    legacy: int = 0
+    port: int = 10001  # of the simulation channel with HTTP; 0 takes a free one, here and below
+    events: int = 10020  # port of the events
+    legacy: int = 0  # port of the format of version 3.0
     host: str = "127.0.0.1"
+    # of a force that are understood; any other is ignored in silence
     spellings: tuple[str, ...] = ("vector", "values")
-    force_scale: float = 1.0
-    kind: str = "inverse3"
+    force_scale: float = 1.0  # factor on every force
+    kind: str = "inverse3"  # type of the devices: inverse3, inverse3x, minverse, or one that nobody knows
+    # those connected: wireless (buttons a, b and c), wired (one button, button), both or none
     grip: str = "wireless"
 
     def __post_init__(self) -> None:
@@ -89,48 +75,22 @@ class SimulatorSettings(HandSettings):
 
 @dataclass
 class SimulatorFaults:
-    """Faults of the service, switched while it runs.
+    """Faults of the service, switched while it runs."""
 
-    Attributes
-    ----------
-    held : bool
-        Answers are kept back until this is false again; then all are sent.
-    dropped, doubled : int
-        Number of the next answers that are lost, or sent twice.
-    closing : bool
-        The next message closes the connection.
-    absent : int
-        Number of the next frames without any device; -1 for ever.
-    bare : bool
-        Frames without what is optional: status, velocity and echoed force.
-    echo : float
-        Factor of the echoed force; the hand feels the force as it is.
-    in_use, powered, calibrated : bool
-        Status of the device.
-    deaf : bool
-        The preset stays as it is.
-    silent_http : bool
-        HTTP knows no routes, as a service before version 3.5 none of the settings.
-    plain_http : bool
-        HTTP answers with the value alone, without an envelope.
-    position : three floats, optional
-        Position that is reported instead of the hand's, m; may be NaN.
-    """
-
-    held: bool = False
-    dropped: int = 0
-    doubled: int = 0
-    closing: bool = False
-    absent: int = 0
-    bare: bool = False
-    echo: float = 1.0
-    in_use: bool = False
+    held: bool = False  # answers are kept back until this is false again; then all are sent
+    dropped: int = 0  # number of the next answers that are lost
+    doubled: int = 0  # number of the next answers that are sent twice
+    closing: bool = False  # the next message closes the connection
+    absent: int = 0  # number of the next frames without any device; -1 for ever
+    bare: bool = False  # frames without what is optional: status, velocity and echoed force
+    echo: float = 1.0  # factor of the echoed force; the hand feels the force as it is
+    in_use: bool = False  # status of the device, as the next two
     powered: bool = True
     calibrated: bool = True
-    deaf: bool = False
-    silent_http: bool = False
-    plain_http: bool = False
-    position: tuple[float, float, float] | None = None
+    deaf: bool = False  # the preset stays as it is
+    silent_http: bool = False  # HTTP knows no routes, as a service before version 3.5 none of the settings
+    plain_http: bool = False  # HTTP answers with the value alone, without an envelope
+    position: tuple[float, float, float] | None = None  # m, reported instead of the hand's; may be NaN
 
 
 @dataclass
@@ -146,29 +106,11 @@ class _Device:
 
 
 class HaplySimulator(ServiceDouble):
-    """The service.
+    """The service with devices of the given ids; its hand moves and forces lapse by the time, s, that `clock` returns.
 
-    Parameters
-    ----------
-    settings : SimulatorSettings, optional
-        Ports, spellings, hand.
-    clock : callable
-        Returns the time, s, by which the hand moves and forces lapse.
-    devices : tuple of str
-        Ids of the devices.
-    inventory : mapping, optional
-        First frame of a service, with its devices and grips, instead of those of the settings; it is copied.
-
-    Attributes
-    ----------
-    faults : SimulatorFaults
-        What goes wrong; may be changed at any time.
-    received : int
-        Messages on the simulation channel.
-    port, events_port, legacy_port : int
-        Ports in use, once started.
-    grips : dict
-        Entries of the inventory's grips by family; may be changed at any time.
+    An `inventory` is the first frame of a service, with its devices and grips, instead of those of the settings; it is
+    copied. `faults` and `grips`, the inventory's entries by family, may be changed at any time. `received` counts
+    messages on the simulation channel; `port`, `events_port` and `legacy_port` are in use once started.
     """
 
     def __init__(

@@ -52,13 +52,10 @@ AXES = PLAIN_AXES
 _MODELS = {"touch x": "desktop", "touchx": "desktop", "desktop": "desktop", "omni": "omni", "touch": "touch"}
 _DAMPING, _MASS = 0.5, 0.045  # N·s/m, assumed; kg, apparent at the tip of a Touch (3D Systems' data sheet)
 _PRIORITY = 0xFFFF  # of the callback, the highest
-_START, _FASTEST = 2.0, 1.0  # s that the frames of the start may take, m/s
-_MARGIN, _UNSTATED_REACH = 0.02, 0.4  # m around the largest workspace; m where none is stated
-_PAUSE, _LONGEST_PAUSE, _AGAIN = (
-    0.1,
-    5.0,
-    10.0,
-)  # s of zero force after an error, doubled where it comes again so soon
+_START, _FASTEST = 2.0, 1.0  # s that the frames of the start may take; faster is an error, m/s
+_MARGIN, _UNSTATED_REACH = 0.02, 0.4  # m around the largest workspace; m of reach where none is stated
+# s of zero force after an error, at first and at most: doubled where an error comes again within _AGAIN, s
+_PAUSE, _LONGEST_PAUSE, _AGAIN = 0.1, 5.0, 10.0
 _GOODBYE = 0.1  # s for the last frame
 _BUTTONS = 4
 _MM = 1e-3
@@ -66,31 +63,16 @@ _MM = 1e-3
 
 @dataclass(frozen=True)
 class OpenHapticsSettings:
-    """Settings of the connection.
+    """Settings of the connection."""
 
-    Attributes
-    ----------
-    device : str
-        Name of the device in the vendor's configuration.
-    library : str
-        File of the vendor's library; empty looks for it.
-    rate : float
-        Frames per second of the library's scheduler, Hz; 500 or 1000.
-    clutch : float
-        Button, 1 to 4, that works as a clutch; 0 for none. Of the others the first is the dead-man button where one is
-        asked for, and each stops the force else.
-    inkwell : {"rest", "ignore"}
-        Whether a stylus that stands in its inkwell lets go of the body.
-    switch : {"ignore", "hold"}
-        Whether the force acts only while the device's safety switch is active.
-    """
-
-    device: str = "Default Device"
-    library: str = ""
-    rate: float = 1000.0
+    device: str = "Default Device"  # name of the device in the vendor's configuration
+    library: str = ""  # file of the vendor's library; empty looks for it
+    rate: float = 1000.0  # Hz, frames of the library's scheduler; 500 or 1000
+    # button, 1 to 4, that works as a clutch; 0 for none. Of the others the first is the dead-man button where one is
+    # asked for, and each stops the force else
     clutch: float = 0.0
-    inkwell: str = "rest"
-    switch: str = "ignore"
+    inkwell: str = "rest"  # rest or ignore: whether a stylus that stands in its inkwell lets go of the body
+    switch: str = "ignore"  # ignore, or hold: the force acts only while the device's safety switch is active
 
     def __post_init__(self) -> None:
         words = self.inkwell in {"rest", "ignore"} and self.switch in {"ignore", "hold"}
@@ -105,25 +87,10 @@ class OpenHapticsSettings:
 
 
 class OpenHapticsDevice:
-    """One device behind the vendor's library.
+    """One device behind the vendor's library; its traits are of its own figures and its profile's the smaller ones.
 
-    Attributes
-    ----------
-    traits : Traits
-        Of the opened device: of its own figures and those of its profile, the smaller ones.
-    profile : DeviceProfile
-        The profile that its model has.
-    name : str
-        Its model and serial number.
-    note : str
-        What was taken on trust when it was opened, as a sentence; empty for nothing.
-    frames : int
-        Frames so far.
-
-    Parameters
-    ----------
-    settings : OpenHapticsSettings, optional
-        Settings of the connection.
+    `profile` is that of its model; `name` has its serial number; `note` says in a sentence what was taken on trust when
+    it was opened, empty for nothing; `frames` counts those so far.
     """
 
     traits: ClassVar[Traits] = Traits(

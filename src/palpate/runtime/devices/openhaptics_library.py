@@ -95,18 +95,7 @@ _MOST_ERRORS = 64  # a list that is longer doesn't end
 
 
 class HdLibrary(VendorLibrary):
-    """The library's functions, with their types, as attributes.
-
-    Parameters
-    ----------
-    library : ctypes.CDLL
-        As loaded.
-
-    Raises
-    ------
-    DeviceError
-        If a function is missing.
-    """
+    """The library's functions, with their types, as attributes; one that is missing is a DeviceError."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
         super().__init__(

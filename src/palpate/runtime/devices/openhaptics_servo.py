@@ -66,21 +66,10 @@ _CELLS = EARLY + 6 * FIRST
 
 
 class Mailbox:
-    """The numbers that the loop and the callback share.
+    """The numbers (floats, in `cells`) that the loop and the callback share.
 
-    Attributes
-    ----------
-    cells : array of float
-        All of them.
-
-    Parameters
-    ----------
-    functions : mapping of str to int
-        Addresses of the library's functions.
-    device : int
-        Handle of the device.
-    patience : int
-        Frames without a new force after which zero is sent.
+    They hold the addresses of the library's functions, the handle of the device, and its patience: the frames without a
+    new force after which zero is sent.
     """
 
     def __init__(self, functions: Mapping[str, int], device: int, patience: int) -> None:

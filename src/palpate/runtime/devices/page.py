@@ -35,13 +35,7 @@ def page_patience(period: float) -> float:
 
 
 class FrameInterpolator:
-    """Straight lines between the frames of a slow input, one frame behind, without overshoot.
-
-    Attributes
-    ----------
-    position : (3,)
-        The interpolated position, m; the array given.
-    """
+    """Straight lines between the frames of a slow input, one frame behind, written into an array (3,), m."""
 
     def __init__(self, position: np.ndarray) -> None:
         self.position = position

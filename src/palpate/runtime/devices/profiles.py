@@ -22,35 +22,16 @@ _CHAI3D = "as open drivers have it (CHAI3D 3.2)"
 
 @dataclass(frozen=True)
 class DeviceProfile:
-    """The limits of one kind of device.
+    """The limits of one kind of device."""
 
-    Attributes
-    ----------
-    name : str
-        As its maker calls it, in small letters.
-    driver : str
-        Name of its driver, as in ``--device``.
-    max_force : float
-        F_max, N.
-    max_stiffness : float
-        The stiffest spring that it renders, K_max, N/m; infinite where nobody states one.
-    max_damping : float
-        The largest virtual damping, B_max, N·s/m; infinite where nobody states one.
-    radius : float
-        Of a sphere in its workspace, m.
-    source : str
-        Where the figures come from.
-    resolution : float
-        Steps of the handle's place, m, rounded from data sheets; 60 µm, the coarsest, where none is known.
-    """
-
-    name: str
-    driver: str
-    max_force: float
-    max_stiffness: float
-    max_damping: float
-    radius: float
-    source: str = _CHAI3D
+    name: str  # as its maker calls it, in small letters
+    driver: str  # as in --device
+    max_force: float  # F_max, N
+    max_stiffness: float  # K_max, N/m: the stiffest spring that it renders; infinite where nobody states one
+    max_damping: float  # B_max, N·s/m: the largest virtual damping; infinite where nobody states one
+    radius: float  # m, of a sphere in its workspace
+    source: str = _CHAI3D  # where the figures come from
+    # m, steps of the handle's place, rounded from data sheets; the coarsest where none is known
     resolution: float = _COARSEST
 
 
@@ -89,13 +70,7 @@ PROFILES: dict[str, DeviceProfile] = {
 
 
 def device_profile(name: str) -> DeviceProfile:
-    """Return the profile of a device by its name, such as ``"falcon"``.
-
-    Raises
-    ------
-    UsageError
-        If no device of that name is known.
-    """
+    """Return the profile of a device by its name, such as ``"falcon"``."""
     try:
         return PROFILES[name.lower()]
     except KeyError as error:

@@ -23,21 +23,11 @@ __all__ = ["RecordedHand", "RecordedSettings"]
 
 @dataclass(frozen=True)
 class RecordedSettings:
-    """Settings of a recorded hand.
+    """Settings of a recorded hand."""
 
-    Attributes
-    ----------
-    file : str
-        The recorded touch.
-    speed : float
-        Times as fast as it was recorded.
-    repeat : float
-        1 begins again at the end; with 0 the hand lets go there.
-    """
-
-    file: str = ""
-    speed: float = 1.0
-    repeat: float = 0.0
+    file: str = ""  # the recorded touch
+    speed: float = 1.0  # times as fast as it was recorded
+    repeat: float = 0.0  # 1 begins again at the end; with 0 the hand lets go there
 
     def __post_init__(self) -> None:
         if not (self.file and 0.0 < self.speed <= 100.0):

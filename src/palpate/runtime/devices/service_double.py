@@ -24,24 +24,14 @@ _STEP = 1e-3  # s of the hand's integration
 
 @dataclass(frozen=True)
 class HandSettings:
-    """Settings of the hand.
+    """Settings of the hand."""
 
-    Attributes
-    ----------
-    amplitude, frequency : float
-        Stroke, m and Hz; downwards first.
-    mass, damping, stiffness : float
-        kg, N·s/m, N/m.
-    silence : float
-        Time without a command after which the force on it lapses, s.
-    """
-
-    amplitude: float = 0.03
-    frequency: float = 0.5
-    mass: float = 0.3
-    damping: float = 5.0
-    stiffness: float = 300.0
-    silence: float = 0.1
+    amplitude: float = 0.03  # m, of the stroke, downwards first
+    frequency: float = 0.5  # Hz
+    mass: float = 0.3  # kg
+    damping: float = 5.0  # N·s/m
+    stiffness: float = 300.0  # N/m
+    silence: float = 0.1  # s without a command after which the force on it lapses
 
     def __post_init__(self) -> None:
         if not (self.mass > 0.0 and self.silence > 0.0 and abs(self.amplitude) <= 0.1):
@@ -54,14 +44,8 @@ class HandSettings:
 class MovedMass:
     """The mass on a moving spring, in axes with z up.
 
-    Attributes
-    ----------
-    position, velocity : (3,)
-        m from the middle of the reach, m/s.
-    force : (3,)
-        On the hand, N; lapses after the silence of the settings.
-    commanded : float
-        When it was last set, s.
+    Its `position` (3,), m, counts from the middle of the reach; `velocity` (3,), m/s. The `force` (3,), N, on the hand
+    was set at the time `commanded`, s, and lapses after the silence of the settings.
     """
 
     def __init__(self, settings: HandSettings) -> None:
@@ -88,13 +72,7 @@ class MovedMass:
 
 
 class ServiceDouble:
-    """A service on a thread of its own; a context manager. Its kinds open their ports in `_listen`.
-
-    Parameters
-    ----------
-    name : str
-        What is simulated, for messages.
-    """
+    """A service on a thread of its own; a context manager. Its kinds open their ports in `_listen`."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -102,13 +80,7 @@ class ServiceDouble:
         self._servers: list[Any] = []
 
     def start(self) -> Self:
-        """Listen.
-
-        Raises
-        ------
-        PortInUseError
-            If a port is taken.
-        """
+        """Listen; a port that is taken raises PortInUseError."""
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
         try:

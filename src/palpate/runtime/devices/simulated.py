@@ -28,14 +28,12 @@ __all__ = ["SimulatedHand", "SimulatedSettings"]
 
 _SHAPES = ("sine", "press", "random", "adversarial")
 _RECORDED = len(_SHAPES)
-_STEP = 1e-4  # s
+_STEP = 1e-4  # s, of the motion's integration
 _PAST = 512  # samples kept for the delay
-_LONGEST_DELAY, _LONGEST_STRETCH = (
-    0.015,
-    0.1,
-)  # s: staler input counts as stalled; a longer pause isn't simulated
+# s: staler input counts as stalled; a longer pause isn't simulated
+_LONGEST_DELAY, _LONGEST_STRETCH = 0.015, 0.1
 _WAVES = 6  # of the random script: tremor has 8 to 12 Hz, voluntary motion ends near 6
-_SLOWEST, _FASTEST = 0.2, 8.0  # Hz
+_SLOWEST, _FASTEST = 0.2, 8.0  # Hz, of the random script's waves
 _RISE = 0.2  # s, of a press
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
@@ -43,61 +41,30 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 @dataclass(frozen=True)
 class SimulatedSettings:
-    """Settings of the hand, of the device in it, and of the script.
+    """Settings of the hand, of the device in it, and of the script."""
 
-    Attributes
-    ----------
-    mass : float
-        Of device and hand together, kg.
-    damping : float
-        The device's own, b, N·s/m.
-    friction : float
-        The device's Coulomb friction, N.
-    grip, grip_damping : float
-        The hand's spring, N/m, and damper, N·s/m.
-    step : float
-        Of the encoder, m; 0 for none.
-    noise : float
-        Standard deviation of what is read, along one axis, m; 0 for none.
-    delay : float
-        Age of what is read, s, at most 0.015.
-    jitter : float
-        What is read is older still by up to this, s, evenly distributed, and its time doesn't say so.
-    shape : {"sine", "press", "random", "adversarial"}
-        Where the hand wants to be: A sin 2πft along the direction; A within 0.2 s, and stay; A times smooth noise in
-        all directions about 0.6 A; or A and 0.2 A by turns, whichever way it already moves, in order to shake.
-    amplitude : float
-        A, m.
-    frequency : float
-        Of the sine, Hz.
-    x, y, z : float
-        Direction, normalised.
-    seed : float
-        Of the random script; a whole number.
-    profile : str
-        Device whose workspace and limits it has, such as ``falcon``; see `profiles.PROFILES`.
-    file : str
-        Recorded touch whose hand it follows over and over, instead of `shape`; none by default.
-    """
-
-    mass: float = 0.3
-    damping: float = 0.5
-    friction: float = 0.0
-    grip: float = 300.0
-    grip_damping: float = 5.0
-    step: float = 0.0
-    noise: float = 0.0
-    delay: float = 0.0
+    mass: float = 0.3  # kg, of device and hand together
+    damping: float = 0.5  # N·s/m, the device's own b
+    friction: float = 0.0  # N, the device's Coulomb friction
+    grip: float = 300.0  # N/m, the hand's spring
+    grip_damping: float = 5.0  # N·s/m, the hand's damper
+    step: float = 0.0  # m, of the encoder; 0 for none
+    noise: float = 0.0  # m, standard deviation of what is read, along one axis; 0 for none
+    delay: float = 0.0  # s, age of what is read, at most 0.015
+    # s by up to which what is read is older still, evenly distributed; its time doesn't say so
     jitter: float = 0.0
+    # where the hand wants to be. sine: A sin 2πft along the direction; press: A within 0.2 s, and stay; random: A times
+    # smooth noise in all directions about 0.6 A; adversarial: A and 0.2 A by turns, whichever way it already moves, in
+    # order to shake
     shape: str = "sine"
-    amplitude: float = 0.03
-    frequency: float = 0.5
-    x: float = 0.0
+    amplitude: float = 0.03  # A, m
+    frequency: float = 0.5  # f, Hz, of the sine
+    x: float = 0.0  # direction, normalised, with y and z
     y: float = -1.0
     z: float = 0.0
-    seed: float = 0.0
-    profile: str = "omega.3"
-    file: str = ""
+    seed: float = 0.0  # of the random script; a whole number
+    profile: str = "omega.3"  # device whose workspace and limits it has; see `profiles.PROFILES`
+    file: str = ""  # recorded touch whose hand it follows over and over, instead of `shape`
 
     def __post_init__(self) -> None:
         if self.shape not in _SHAPES:
@@ -125,14 +92,8 @@ class SimulatedSettings:
 class SimulatedHand:
     """Holds the body and moves by the script, as far as the loop's force lets it.
 
-    Attributes
-    ----------
-    place, velocity : (3,)
-        The true handle, m and m/s, without encoder and delay.
-    push : (3,)
-        The loop's force on the handle, N.
-    work : float
-        What the loop's force has done on the handle, J: positive where the loop gave energy.
+    `place` and `velocity` (3,) are the true handle's, m and m/s, without encoder and delay; `push` (3,) is the loop's
+    force on it, N, and `work` what that force has done on it, J: positive where the loop gave energy.
     """
 
     traits: ClassVar[Traits] = Traits(

@@ -56,39 +56,23 @@ _ADDED, _REMOVED = 0, 1  # second integers of _DEVICE
 _TAG = 0x7FAA0000  # in the first integer of requests and answers
 _SENSITIVITY, _NAME, _BUTTONS, _PROTOCOL = 0x1002, 0x2000, 0x2003, 0x5500
 _TEXT = 24  # bytes of a name in one packet
-_ANSWER, _ASKED, _PATIENCE = 0.3, 0.1, 0.35  # s
+# s to wait for an answer, between two questions that show whether the daemon lives, and of silence until it is a fault
+_ANSWER, _ASKED, _PATIENCE = 0.3, 0.1, 0.35
 _CHUNK, _MOST_CHUNKS = 8192, 4  # bytes; in one tick: more than a daemon sends
 _FEWEST_BUTTONS = 2  # that any puck has
 
 
 @dataclass(frozen=True)
 class SpaceMouseSettings:
-    """Settings of the puck.
+    """Settings of the puck."""
 
-    Attributes
-    ----------
-    socket : str
-        The daemon's socket; empty looks for it.
-    mapping : {"speed", "position"}
-        What the puck's deflection sets of the hand.
-    speed : float
-        Of the hand at full deflection, m/s, where the mapping is speed.
-    full : float
-        Counts that the daemon reports at full deflection.
-    dead : float
-        Dead zone, as a share of the full deflection.
-    centre : float
-        Number of the button that brings the hand back to the centre, from 1; 0 for none.
-    hold : float
-        Number of the button that holds the body while it is pressed, from 1; with 0 the hand always holds it.
-    """
-
-    socket: str = ""
-    mapping: str = "speed"
-    speed: float = 0.08
-    full: float = 350.0
-    dead: float = 0.1
-    centre: float = 2.0
+    socket: str = ""  # the daemon's; empty looks for it
+    mapping: str = "speed"  # speed or position: what the puck's deflection sets of the hand
+    speed: float = 0.08  # m/s of the hand at full deflection, where the mapping is speed
+    full: float = 350.0  # counts that the daemon reports at full deflection
+    dead: float = 0.1  # dead zone, as a share of the full deflection
+    centre: float = 2.0  # number of the button that brings the hand back to the centre, from 1; 0 for none
+    # number of the button that holds the body while pressed, from 1; 0: the hand always holds it
     hold: float = 0.0
 
     def __post_init__(self) -> None:
@@ -112,15 +96,7 @@ def sockets(environment: Mapping[str, str], configuration: str) -> tuple[str, ..
 
 
 class SpaceMouseDevice:
-    """One puck, or all pucks of the daemon as one.
-
-    Attributes
-    ----------
-    name : str
-        As the daemon calls it.
-    protocol : int
-        Version of the daemon's protocol; 0 before spacenavd 1.0.
-    """
+    """One puck, or all pucks of the daemon as one; `protocol` is the daemon's version, 0 before spacenavd 1.0."""
 
     traits: ClassVar[Traits] = Traits(
         0.075, 10.0, None, "no motor; the limit on the force that is drawn", buttons=_FEWEST_BUTTONS - 1

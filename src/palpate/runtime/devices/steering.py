@@ -18,16 +18,8 @@ _SMOOTHING, _LONGEST_STEP = 0.020, 0.050  # s
 class DeadZone:
     """One axis of a control: its range, brought to −1 … 1 or 0 … 1, and a zone around rest that counts as rest.
 
-    Parameters
-    ----------
-    lowest, highest : float
-        Of the range that the control has.
-    flat : float
-        Half the zone around rest that its driver states, in the same units.
-    dead : float
-        The smallest dead zone, as a share of the way.
-    one_sided : bool
-        A trigger, which rests at its lowest value.
+    `flat` is half the zone around rest that its driver states, in units of the range `lowest` to `highest`; `dead` the
+    smallest dead zone, as a share of the way. A trigger is `one_sided`: it rests at its lowest value.
     """
 
     def __init__(
@@ -53,16 +45,10 @@ class DeadZone:
 
 
 class SteeredHand:
-    """The hand in a sphere, at the place or with the velocity that a control says.
+    """The hand in a sphere of `radius`, m, at the place or with the velocity that a control states.
 
-    Parameters
-    ----------
-    position : (3,)
-        The hand's, m from the centre; renewed in place.
-    radius : float
-        Of the sphere, m: the place of a control at its end.
-    speed : float
-        Of the hand with a control at its end, m/s; zero makes the control a place.
+    Its `position` (3,), m from the centre, is renewed in place. A control at its end means a place on the sphere, or a
+    velocity of `speed`, m/s; zero makes the control a place.
     """
 
     def __init__(self, position: np.ndarray, radius: float, speed: float) -> None:

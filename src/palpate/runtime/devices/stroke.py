@@ -22,34 +22,18 @@ __all__ = ["StrokeDevice", "StrokeSettings"]
 
 @dataclass(frozen=True)
 class StrokeSettings:
-    """Settings of the script.
+    """Settings of the script."""
 
-    Attributes
-    ----------
-    amplitude : float
-        m.
-    frequency : float
-        Hz.
-    x, y, z : float
-        Direction, normalised.
-    shape : {"sine", "ramp"}
-        A sin 2πft, or the triangle through the same zeros and peaks.
-    stall_at, nan_at, fail_at : float
-        Seconds after the first reading at which the samples stop, turn into NaN, or reading raises.
-    lasting : float
-        Duration of each of these, s.
-    """
-
-    amplitude: float = 0.03
-    frequency: float = 0.5
-    x: float = 0.0
+    amplitude: float = 0.03  # A, m
+    frequency: float = 0.5  # f, Hz
+    x: float = 0.0  # direction, normalised, with y and z
     y: float = -1.0
     z: float = 0.0
-    shape: str = "sine"
-    stall_at: float = math.inf
-    nan_at: float = math.inf
-    fail_at: float = math.inf
-    lasting: float = math.inf
+    shape: str = "sine"  # sine: A sin 2πft; ramp: the triangle through the same zeros and peaks
+    stall_at: float = math.inf  # s after the first reading at which the samples stop
+    nan_at: float = math.inf  # s after it at which they turn into NaN
+    fail_at: float = math.inf  # s after it at which reading raises
+    lasting: float = math.inf  # s, duration of each of these
 
     def __post_init__(self) -> None:
         if self.shape not in {"sine", "ramp"}:

@@ -17,21 +17,8 @@ Signatures = Mapping[str, tuple[Any, tuple[Any, ...]]]
 class VendorLibrary:
     """The library's functions, with their types, as attributes.
 
-    Parameters
-    ----------
-    library : ctypes.CDLL
-        As loaded.
-    signatures : mapping
-        Functions that the driver needs.
-    extra : mapping
-        Functions that it can do without; see `has`.
-    install : str
-        What to do where a function is missing.
-
-    Raises
-    ------
-    DeviceError
-        If a function that is needed is missing.
+    The driver needs those of `signatures`, of which a missing one is a DeviceError with `install`, what to do about it,
+    and can do without those of `extra`; see `has`.
     """
 
     def __init__(

@@ -17,35 +17,21 @@ from palpate.errors import DeviceError, DeviceLostError, UsageError
 
 __all__ = ["WebsocketChannel"]
 
-_OPENING, _GOODBYE = 2.0, 0.2  # s
+_OPENING, _GOODBYE = 2.0, 0.2  # s to wait for an opening connection, and for the other end to read all
 _BUDGET = 2.5e-4  # s, a quarter of a tick, for what has come: the rest is left to the next call
 _MOST_MESSAGES = 16  # to a call, for the same reason: their reader takes time for each
 _CHUNK = 4096  # bytes
 _SLICE = 256  # bytes that are read without a look at the clock: more than a hundred pings fit in
-_LARGEST = (
-    32768  # bytes of a message: several times the longest of any device service; JSON of it takes half a tick
-)
+# bytes of a message: several times the longest of any device service; JSON of it takes half a tick
+_LARGEST = 32768
 _REMEDY = "Check that it runs, and start again."
 
 
 class WebsocketChannel:
-    """A client's end of a websocket that carries text.
+    """A client's end of a websocket that carries text, to an address such as ``ws://localhost:10001``.
 
-    Parameters
-    ----------
-    url : str
-        Address, such as ``ws://localhost:10001``.
-    service : str
-        Name of what answers there, for messages.
-    clock : callable
-        Returns the time, s, by which `receive` keeps to its budget.
-
-    Raises
-    ------
-    UsageError
-        If the address is not one of a websocket.
-    DeviceError
-        If nothing answers there, or not as a websocket.
+    Messages call what answers there `service`; `receive` keeps to its budget by the time, s, that `clock` returns. A
+    DeviceError says that nothing answers there, or not as a websocket.
     """
 
     def __init__(self, url: str, service: str, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -102,13 +88,7 @@ class WebsocketChannel:
         self._take(early[1:])  # frames that came along with the response
 
     def send(self, text: str) -> None:
-        """Send one message now.
-
-        Raises
-        ------
-        DeviceLostError
-            If the connection is gone, or takes no more.
-        """
+        """Send one message now; DeviceLostError where the connection is gone, or takes no more."""
         try:
             self._protocol.send_text(text.encode())
             self._flush()
@@ -121,12 +101,8 @@ class WebsocketChannel:
         """Return messages that have arrived, waiting for the first at most `wait`, s.
 
         What takes longer than a quarter of a millisecond to read is left to the next call, so that a service which
-        sends without end, pings or numbers, delays no tick.
-
-        Raises
-        ------
-        DeviceLostError
-            If the connection is gone and nothing is left to read, or a message is larger than any of a device.
+        sends without end, pings or numbers, delays no tick. DeviceLostError says that the connection is gone and
+        nothing is left to read, or that a message is larger than any of a device.
         """
         begin = self._clock()
         while len(self._messages) < _MOST_MESSAGES:

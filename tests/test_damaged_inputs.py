@@ -1,7 +1,7 @@
-"""Files of every reader, cut, changed, doubled and filled at random: an answer or a sentence, never anything else.
+"""Meshes, surfaces, studies and recordings, cut, changed and doubled: an answer or a sentence, never anything else.
 
-The bytes are damaged by a seeded generator, so that each run has the same files. What a reader in C or C++ takes runs
-in a child process by the reader's own doing and is tried less often here.
+The bytes are damaged by a seeded generator, so that each run has the same files. Tables and results of other programs
+are tried in `dataset/readers/test_hostile_tables.py`.
 """
 
 from __future__ import annotations
@@ -23,26 +23,9 @@ from palpate.physics.shapes.surface_file import parse_surface
 from palpate.runtime.recording import TICK
 from palpate.runtime.trace_file import TraceWriter, read_trace
 from palpate.study.toml import read_study
-from palpate.tables import read_table
 
 FIELD = Path(__file__).parent / "data" / "field"
 MOST = 2e9  # bytes that a reader may add to the process
-ROWS = [f"{x:.3f}{{0}}{0.05 * x**1.5:.5f}{{0}}{20 + x:g}" for x in np.linspace(0.0, 5.0, 40)]
-
-
-def table(separator: str) -> bytes:
-    head = separator.join(("Extension [mm]", "Load [N]", "Note"))
-    return "\n".join([head, *(row.format(separator) for row in ROWS)]).encode()
-
-
-def workbook(path: Path) -> bytes:
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    book.active.append(["x [mm]", "F [N]"])
-    for k in range(20):
-        book.active.append([0.1 * k, 0.02 * k])
-    book.save(path)
-    return path.read_bytes()
 
 
 def stl(_: Path) -> bytes:
@@ -100,9 +83,6 @@ class Reader:
 
 
 READERS = {
-    "table": Reader("a.csv", lambda _: table(","), read_table),
-    "German table": Reader("a.txt", lambda _: table(";").replace(b".", b","), read_table),
-    "workbook": Reader("a.xlsx", workbook, read_table, 5),
     "study": Reader("a.toml", lambda _: STUDY, read_study),
     "mapping": Reader("a.toml", lambda _: MAPPING, read_mapping),
     "STL": Reader("a.stl", stl, lambda path: parse_surface(str(path))),

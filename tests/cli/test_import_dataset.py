@@ -80,7 +80,7 @@ def test_a_mapping_file_is_taken_with_words_beside_it(palpate, export):
         (("--input", "load=F", "--output", "sag=w"), "no column 'w'"),
         (("--input", "load=F"), "names no outputs"),
         (("--input", "load=F", "--output", "sag=v", "--test", "0.89"), "can't be set aside"),
-        (("--mapping", "nowhere.toml"), "can't be read as a mapping"),
+        (("--mapping", "nowhere.toml"), "nowhere.toml can't be read"),
     ],
 )
 def test_what_does_not_fit_ends_with_2(palpate, export, words, message):

@@ -36,7 +36,7 @@ _CRC = 4  # bytes of the checksum behind a chunk
 
 @dataclass(frozen=True)
 class ChunkFault:
-    """What is wrong with one chunk.
+    """A fault of one chunk.
 
     Attributes
     ----------

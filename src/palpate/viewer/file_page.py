@@ -62,7 +62,7 @@ class ExportedPage:
     file: Path
     hash: str  # SHA-256 of the weights
     comparison: Comparison | None  # None where wasmtime is not installed, or nothing was to be compared
-    left_out: tuple[str, ...] = ()  # fields that make it too large (5 MB), or are on other nodes than the first
+    left_out: tuple[str, ...] = ()  # fields too large for 5 MB, or on other nodes than the first
 
 
 def export_html(

@@ -141,13 +141,7 @@ class RadialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type:
 
 
 def weights_of(sample_weight: Any, rows: int) -> np.ndarray:
-    """Weights (N,) from what the user gave: nothing, one number, or one number per row.
-
-    Raises
-    ------
-    BadValue
-        If they have another shape, or are negative, not finite, or all zero.
-    """
+    """Return weights (N,) ≥ 0 from what the user gave: nothing, one number, or one number per row."""
     if sample_weight is None:
         return np.ones(rows)
     weights = np.array(sample_weight, dtype=np.float64)
@@ -180,21 +174,11 @@ def merge_rows(
 
 @dataclass(frozen=True, eq=False)
 class Units:
-    """The units in which an estimator learns: names, ranges, and one divisor per output.
+    """The units in which an estimator learns: names, ranges, and one divisor per output."""
 
-    Attributes
-    ----------
-    inputs : n ranges
-        Names and trained intervals of the inputs.
-    outputs : m quantities
-        Names of the outputs.
-    divisor : (m,)
-        Largest deviation of each output from its mean, or of all of them.
-    """
-
-    inputs: tuple[Range, ...]
-    outputs: tuple[Quantity, ...]
-    divisor: np.ndarray
+    inputs: tuple[Range, ...]  # n ranges, names and trained intervals
+    outputs: tuple[Quantity, ...]  # m names
+    divisor: np.ndarray  # (m,), largest deviation of each output from its mean, or of all of them
 
     @classmethod
     def of(
@@ -206,13 +190,7 @@ class Units:
         *,
         each: bool,
     ) -> Units:
-        """The units of training rows; `each` output gets its own divisor, or all the same.
-
-        Raises
-        ------
-        BadValue
-            If there are not as many ranges as inputs, or one of them is none.
-        """
+        """Return the units of training rows; `each` output gets its own divisor, or all the same."""
         names = [f"x{i}" for i in range(X.shape[1])] if names is None else [str(name) for name in names]
         inputs = ranges_of(X, names) if ranges is None else _declared(ranges, names)
         size = np.abs(Y - Y.mean(axis=0)).max(axis=0)

@@ -29,21 +29,11 @@ PATIENCE = 600.0  # s; the first build of a target compiles its C library, too
 
 @dataclass(frozen=True)
 class Target:
-    """A built form of the core.
-
-    Attributes
-    ----------
-    file : str
-        Name of the built file.
-    programs : tuple of str
-        The last of the core's sources, which say what it gives to the outside.
-    options : tuple of str
-        Of the compiler.
-    """
+    """A built form of the core."""
 
     file: str
-    programs: tuple[str, ...]
-    options: tuple[str, ...]
+    programs: tuple[str, ...]  # the last of the core's sources, which say what it gives to the outside
+    options: tuple[str, ...]  # for the compiler
 
 
 TARGETS = (
@@ -72,13 +62,7 @@ def _folder() -> Any:
 
 
 def built_core(file: str) -> bytes:
-    """Return a built file of the package.
-
-    Raises
-    ------
-    ResourceError
-        If it is missing, or of other sources than this package's.
-    """
+    """Return a built file of the package; an error where it is missing, or of other sources than this package's."""
     target = next(target for target in TARGETS if target.file == file)
     built, stamp = _folder() / file, _folder() / f"{file}.sources"
     if not built.is_file() or stamp.read_text("ascii").strip() != source_hash(target):
@@ -91,13 +75,7 @@ def built_core(file: str) -> bytes:
 
 
 def build(target: Target, out: Path) -> None:
-    """Compile a target into a file.
-
-    Raises
-    ------
-    UsageError
-        If zig is missing or fails.
-    """
+    """Compile a target into a file with zig."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "core.c"
         source.write_text(generic_source(*target.programs), encoding="utf-8", newline="\n")

@@ -151,13 +151,7 @@ def _write(folder: Path, texts: dict[str, str]) -> tuple[Path, ...]:
 def block_of(
     thing: Surrogate | Network, *, field: str | None, with_field: bool, deviation: bool
 ) -> WeightsBlock:
-    """Return the weights of a body or of a network.
-
-    Raises
-    ------
-    UsageError
-        If a part of it has no C source.
-    """
+    """Return the weights of a body or of a network; an error where a part of it has no C source."""
     if isinstance(thing, Network):
         return WeightsBlock.of_network(thing)
     chosen = chosen_field(thing, field) if with_field else None
@@ -173,15 +167,7 @@ def compare_c(
     single: bool,
     options: tuple[str, ...] = (),
 ) -> Comparison:
-    """Compile exported files and compare them with palpate.
-
-    Raises
-    ------
-    ResourceError
-        If the compiler refuses them.
-    AccuracyError
-        If the program does not answer.
-    """
+    """Compile exported files and compare them with palpate."""
     precision = Precision(single)
     with tempfile.TemporaryDirectory() as folder:
         if isinstance(thing, Network):

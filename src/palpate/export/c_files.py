@@ -36,10 +36,8 @@ from palpate.units import Quantity, Range
 __all__ = ["body_sizes", "c_files", "require_name"]
 
 _WIDTH = 118
-_STACK = {
-    False: 12_000,
-    True: 8_000,
-}  # bytes of all frames of the core together, of double and single precision
+# bytes of all stack frames of the core together: double (False) and single precision (True)
+_STACK = {False: 12_000, True: 8_000}
 _RADIAL, _SURFACE = 40, 8000  # operations of a radial function; of five distances to a curved surface
 _KEYWORDS = frozenset(
     "auto break case char const continue default do double else enum extern float for goto if inline int long "  # noqa: SIM905
@@ -49,13 +47,7 @@ _KEYWORDS = frozenset(
 
 
 def require_name(name: str) -> str:
-    """Return a name that can begin the names of C functions.
-
-    Raises
-    ------
-    UsageError
-        If it is no identifier.
-    """
+    """Return a name that can begin the names of C functions; an error where it is no identifier."""
     if (
         not (name.isascii() and name.isidentifier())
         or name in _KEYWORDS
@@ -88,19 +80,7 @@ class _Facts:
 
 
 def c_files(thing: Surrogate | Network, block: WeightsBlock, name: str, *, single: bool) -> dict[str, str]:
-    """Return the texts of all files by their names.
-
-    Parameters
-    ----------
-    thing : Surrogate or Network
-        What the block is of.
-    block : WeightsBlock
-        Its weights.
-    name : str
-        Beginning of all names in C.
-    single : bool
-        Whether numbers are of single precision.
-    """
+    """Return the texts of all files by their names; `name` begins all names in C, `single` gives 32-bit numbers."""
     if isinstance(thing, Network):
         facts = _Facts(name, single, block, str(thing), thing.inputs, thing.outputs, 0)
         header, public, example = _network_header(facts), NETWORK, NETWORK_EXAMPLE

@@ -52,18 +52,9 @@ def open_instance(
     exchange: bool = False,
     log: Callable[..., None] = lambda *_: None,
 ) -> FmuInstance:
-    """Return an instance of an FMU.
+    """Return an instance of an FMU whose parsed description is given and that is unpacked in `folder`.
 
-    Parameters
-    ----------
-    description : fmpy.model_description.ModelDescription
-        Its description.
-    folder : str
-        Where it is unpacked.
-    exchange : bool
-        Whether in model exchange.
-    log : function
-        Takes what the FMU logs; by default nothing is done: warnings of places outside are what is asked for here.
+    Its log is dropped by default: places outside the trained range are asked for here, and the FMU warns of them.
     """
     kind = _Instance2 if description.fmiVersion == "2.0" else _Instance3
     return kind(description, folder, log, exchange=exchange)
@@ -157,20 +148,10 @@ def _identity(description: Any, folder: str, *, exchange: bool) -> dict[str, str
 
 
 class CheckFmu:
-    """An FMU that is asked as every export is; a context manager.
+    """An FMU, read from its .fmu file with FMPy, that is asked as every export is; a context manager.
 
     Steps are those of co-simulation. The force at a place of a body with a memory is that of model exchange where there
     is one, at a body that remembers nothing.
-
-    Parameters
-    ----------
-    path : Path
-        The .fmu file.
-
-    Raises
-    ------
-    ResourceError
-        If there is no FMPy.
     """
 
     def __init__(self, path: Path) -> None:

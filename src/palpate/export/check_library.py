@@ -14,13 +14,7 @@ __all__ = ["CheckLibrary"]
 
 
 class CheckLibrary:
-    """A library that answers as `palpate.export.check_points.Asker` asks.
-
-    Parameters
-    ----------
-    wrapper : Path
-        The Python file beside the library.
-    """
+    """A library, loaded by its Python wrapper's path, that answers as `palpate.export.check_points.Asker` asks."""
 
     def __init__(self, wrapper: Path) -> None:
         spec = importlib.util.spec_from_file_location(f"exported_{wrapper.stem}", wrapper)

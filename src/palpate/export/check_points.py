@@ -70,37 +70,17 @@ class Asker(Protocol):
 
 @dataclass(frozen=True)
 class Difference:
-    """The largest difference of one quantity.
+    """The largest difference of one quantity."""
 
-    Attributes
-    ----------
-    relative : float
-        Largest |Δ| over (|v| + largest |v|).
-    allowed : float
-        What that may be where it comes closest to it.
-    count : int
-        Numbers that were compared.
-    wrong : int
-        How many are farther off than they may be.
-    """
-
-    relative: float
-    allowed: float
-    count: int
-    wrong: int
+    relative: float  # largest |Δ| over (|v| + largest |v|)
+    allowed: float  # what that may be where it comes closest to it
+    count: int  # numbers that were compared
+    wrong: int  # how many are farther off than they may be
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Differences of an export from palpate.
-
-    Attributes
-    ----------
-    parts : mapping of str to Difference
-        By quantity.
-    single : bool
-        Whether the export is of single precision.
-    """
+    """Differences of an export from palpate, by quantity; `single` for an export of single precision."""
 
     parts: Mapping[str, Difference] = field(default_factory=dict)
     single: bool = False
@@ -181,20 +161,8 @@ def compare_body(
 ) -> Comparison:
     """Return how far an export is from palpate at 1,000 places, along a stroke of its memory, and in its field.
 
-    Parameters
-    ----------
-    surrogate : Surrogate
-        The body.
-    asker : Asker
-        Its export.
-    precision : Precision, optional
-        Double by default.
-    field : str
-        Name of the field that went out; "" for none.
-    deviation : bool
-        Whether the posterior went out.
-    partial : bool
-        Whether columns that the export answers by not-a-number throughout are left out.
+    Precision is double by default. `field` names the field that went out ("" for none), `deviation` says whether the
+    posterior did. `partial` leaves out columns that the export answers by not-a-number throughout.
     """
     precision = precision or Precision()
     energy, X = surrogate.energy, places(surrogate)
@@ -239,16 +207,9 @@ def compare_network(
     ask: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
     precision: Precision | None = None,
 ) -> Comparison:
-    """Return how far an exported network is from palpate at 1,000 inputs, with its derivatives.
+    """Return how far an exported network is from palpate at 1,000 inputs, with its derivatives; by default in double.
 
-    Parameters
-    ----------
-    network : Network
-        The network.
-    ask : function
-        Of inputs (N, n); returns outputs (N, m) and derivatives (N, m, n).
-    precision : Precision, optional
-        Double by default.
+    `ask` takes inputs (N, n) and returns outputs (N, m) and derivatives (N, m, n).
     """
     precision = precision or Precision()
     low, high = bounds(network.inputs)
@@ -386,18 +347,7 @@ def compare_field(
 ) -> Difference:
     """Return how far the field of an export is from palpate, at places of `places` and at the deepest trained touches.
 
-    Its modes were rounded: it may be off by 1e-4 of its largest value.
-
-    Parameters
-    ----------
-    surrogate : Surrogate
-        The body.
-    shown : FieldSurrogate
-        A field of it.
-    asker : Asker
-        Its export, which answers `shapes` of this field.
-    precision : Precision, optional
-        Double by default.
+    The asker answers `shapes` of the field `shown`. Its modes were rounded: it may be off by 1e-4 of its largest value.
     """
     X = np.vstack([places(surrogate)[:_TOUCHES], deepest_touches(surrogate, shown)])
     X = X[(true_answers(surrogate.energy, X)[:, 20].astype(int) & TOO_DEEP) == 0]

@@ -21,18 +21,10 @@ _LONGEST = 120.0  # s
 
 @dataclass(frozen=True)
 class CheckProgram:
-    """A program around exported C files.
-
-    Attributes
-    ----------
-    path : Path
-        The program.
-    components : tuple of int
-        Nodes and components of the field; (0, 0) without one.
-    """
+    """A program around exported C files."""
 
     path: Path
-    components: tuple[int, int] = (0, 0)
+    components: tuple[int, int] = (0, 0)  # nodes and components of the field; (0, 0) without one
 
     @classmethod
     def compile(
@@ -47,29 +39,10 @@ class CheckProgram:
         field: tuple[int, int] = (0, 0),
         options: Sequence[str] = (),
     ) -> CheckProgram:
-        """Compile the exported sources with the program that asks them.
+        """Compile exported .c sources, with the header beside them, into `folder` with the program that asks them.
 
-        Parameters
-        ----------
-        compiler : str
-            Path of the compiler.
-        sources : sequence of Path
-            The exported .c files; the header lies beside them.
-        name : str
-            Beginning of the exported names.
-        folder : Path
-            Where the program is put.
-        memory, network : bool
-            Whether a memory is in, and whether it is a network alone.
-        field : (int, int)
-            Nodes and components of the field that is in.
-        options : sequence of str
-            Further options for the compiler.
-
-        Raises
-        ------
-        ResourceError
-            If the compiler refuses them.
+        `name` begins the exported names. `memory` says whether a memory is in, `network` whether it is a network alone,
+        `field` how many nodes and components the field has.
         """
         main = folder / "check_main.c"
         kinds = {"MEMORY": memory, "NETWORK": network, "FIELD": field[0] > 0}

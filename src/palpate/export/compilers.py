@@ -20,10 +20,7 @@ _LONGEST = 300.0  # s
 def find_compiler(name: str | None = None) -> str | None:
     """Return the path of a C compiler: that of a name, of the variable CC, or the first one known; None without any.
 
-    Raises
-    ------
-    UsageError
-        If there is no compiler of that name.
+    A name without a compiler is an error.
     """
     if name and shutil.which(name) is None:
         raise UsageError(
@@ -41,13 +38,7 @@ def find_compiler(name: str | None = None) -> str | None:
 def compile_c(
     compiler: str, sources: Sequence[Path], out: Path, *, options: Sequence[str] = (), optimise: str = "-O2"
 ) -> Path:
-    """Compile sources to a program or, with the option ``-shared``, to a library.
-
-    Raises
-    ------
-    ResourceError
-        If the compiler refuses them, or takes longer than five minutes.
-    """
+    """Compile sources within five minutes to a program or, with the option ``-shared``, to a library."""
     command = [compiler, "-std=c99", optimise, *options, *map(str, sources), "-o", str(out), "-lm"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST, check=False)

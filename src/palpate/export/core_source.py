@@ -35,13 +35,7 @@ def core_source(block: WeightsBlock) -> str:
 
 
 def generic_source(*programs: str) -> str:
-    """Return the core with all baselines and memories of palpate, and programs that read blocks of weights.
-
-    Parameters
-    ----------
-    programs : str
-        The last of the core's files, for example ``fmi2.c``.
-    """
+    """Return the core with all baselines and memories, and programs (``fmi2.c``) that read blocks of weights."""
     surrogates = resources.files("palpate.surrogates")
     texts = [core_file(name) for name in ("palpate_core.h", "prelude.c", "network.c", "surface.c")]
     texts += [(surrogates / "baselines" / name).read_text("utf-8") for name in _BASELINES]

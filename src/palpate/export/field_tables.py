@@ -27,9 +27,8 @@ __all__ = ["PROMISE", "SURFACE", "VARIED", "RoundedModes", "chosen_field", "deep
 SURFACE, VARIED = 49, 52
 PROMISE = 1e-4  # of a field's largest change: how far the field that goes out may be off
 _LARGEST = 32767
-_SHARE = (
-    0.9  # of the promise that rounding the modes may use up; the rest is for places, and for single precision
-)
+# share of the promise that rounding the modes may use up; the rest is for places, and for single precision
+_SHARE = 0.9
 _DEEPEST = 24  # touches from which the largest change is taken
 _HALVINGS = 60
 _OTHERS = 1000  # places beside the trained ones at which modes are held precise enough
@@ -37,18 +36,10 @@ _OTHERS = 1000  # places beside the trained ones at which modes are held precise
 
 @dataclass(frozen=True, eq=False)
 class RoundedModes:
-    """Rest and modes of a field as whole numbers of two bytes.
+    """Rest and modes of a field as whole numbers of two bytes."""
 
-    Attributes
-    ----------
-    scales : (1 + k,)
-        What 1 stands for in the rest and in each mode.
-    small : (1 + k, nodes, components) int16
-        The rest, then the modes.
-    """
-
-    scales: np.ndarray
-    small: np.ndarray
+    scales: np.ndarray  # (1 + k,), what 1 stands for in the rest and in each mode
+    small: np.ndarray  # (1 + k, nodes, components) int16: the rest, then the modes
 
     @classmethod
     def of(cls, surrogate: Surrogate, shown: FieldSurrogate) -> RoundedModes:
@@ -110,13 +101,7 @@ def _largest_change(shown: FieldSurrogate, X: np.ndarray) -> float:
 
 
 def chosen_field(surrogate: Surrogate, name: str | None) -> str | None:
-    """Return the field that goes out: the one that is named, or the displacement, or none.
-
-    Raises
-    ------
-    UsageError
-        If there is no field of that name.
-    """
+    """Return the field that goes out: the one that is named, or the displacement, or none."""
     if name is not None and name not in surrogate.fields:
         raise UsageError(
             f"The body has no field {name!r}.",
@@ -130,21 +115,9 @@ def chosen_field(surrogate: Surrogate, name: str | None) -> str | None:
 
 
 def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) -> dict[int, Table]:
-    """Return the arrays of a field in their places.
+    """Return the arrays of a field in their places; `known` are those of its energy, among them of the same surface.
 
-    Parameters
-    ----------
-    surrogate : Surrogate
-        The body.
-    name : str
-        The field's name.
-    known : mapping
-        The arrays of its energy, among them those of the same surface.
-
-    Raises
-    ------
-    UsageError
-        If it is a field at the nodes of a bent body, which the core does not know.
+    The core does not know fields at the nodes of a bent body.
     """
     shown = surrogate.fields[name]
     if not isinstance(shown, FieldSurrogate):

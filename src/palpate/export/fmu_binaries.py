@@ -60,10 +60,7 @@ def fmu_source() -> str:
 def built_binaries(version: str = "3.0") -> dict[str, bytes]:
     """Return the binaries that are kept with the package, by an FMU's folder and ending: "x86_64-linux/.so".
 
-    Parameters
-    ----------
-    version : str
-        Of FMI: in 2.0 the folders have other names, and one file serves both kinds of macOS.
+    In version 2.0 of FMI the folders have other names, and one file serves both kinds of macOS.
     """
     folder = resources.files("palpate.export") / "binaries"
     kept = {file: folder / _file_of(file) for file in TARGETS}
@@ -80,13 +77,7 @@ def _file_of(target: str) -> str:
 
 
 def build_binaries() -> dict[str, bytes]:
-    """Return the binaries, compiled anew.
-
-    Raises
-    ------
-    ResourceError
-        If there is no `ziglang`, or it refuses the source.
-    """
+    """Return the binaries, compiled anew with `ziglang`."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "palpate_fmu.c").write_text(fmu_source(), "utf-8")

@@ -20,18 +20,9 @@ _EXPERIMENT = '<DefaultExperiment startTime="0" stopTime="1" stepSize="0.001"/>'
 
 
 def model_description(surrogate: Surrogate, name: str, guid: str, version: str) -> str:
-    """Return the text of modelDescription.xml.
+    """Return the text of modelDescription.xml in version "2.0" or "3.0" of FMI.
 
-    Parameters
-    ----------
-    surrogate : Surrogate
-        The body.
-    name : str
-        Model identifier.
-    guid : str
-        SHA-256 of the weights: guid, or instantiation token.
-    version : str
-        "2.0" or "3.0".
+    `name` is the model identifier; `guid`, the SHA-256 of the weights, is guid or instantiation token.
     """
     from palpate import __version__
 

@@ -36,40 +36,20 @@ _ROOT, _ROOT_RATE = "J^0.5", "J^0.5/s"  # no whole powers of SI's base units
 
 @dataclass(frozen=True)
 class Variable:
-    """A scalar variable.
-
-    Attributes
-    ----------
-    name, words : str
-        Its name, and what it is.
-    reference : int
-        Value reference; all are different.
-    causality : str
-        Of FMI.
-    variability : str
-        Of FMI; what is discrete is Boolean, all else real.
-    unit : str
-        As `defined_units` defines it; "" for Booleans.
-    start, low, high, nominal : float, optional
-        Value at the start, range, and usual size.
-    rate_of : int, optional
-        Value reference of the state that it is the rate of.
-    depends : tuple of int, optional
-        Value references of inputs and states that it depends on while a simulation runs; None for all of them.
-    """
+    """A scalar variable of FMI; what is discrete is Boolean, all else real."""
 
     name: str
-    words: str
-    reference: int
+    words: str  # what it is
+    reference: int  # value reference; all are different
     causality: Literal["input", "output", "parameter", "local"]
     variability: Literal["continuous", "discrete", "tunable"]
-    unit: str = ""
+    unit: str = ""  # as `defined_units` defines it; "" for Booleans
     start: float | None = None
     low: float | None = None
     high: float | None = None
-    nominal: float | None = None
-    rate_of: int | None = None
-    depends: tuple[int, ...] | None = _PLACES
+    nominal: float | None = None  # usual size
+    rate_of: int | None = None  # value reference of the state that it is the rate of
+    depends: tuple[int, ...] | None = _PLACES  # references of inputs and states it depends on; None: all
 
     @property
     def is_state(self) -> bool:

@@ -32,30 +32,14 @@ _COLOUR = (0.80, 0.45, 0.40, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class ShapeSeries:
-    """A surface, or a line of nodes, in several states.
+    """A surface, or a line of nodes, in several states."""
 
-    Attributes
-    ----------
-    points : (P, 3) array
-        Nodes at rest in m, z up.
-    cells : (T, 3) or (T, 2) int array
-        Triangles, counter-clockwise seen from outside, or the pieces of a line.
-    displacement : (k, P, 3) array
-        Displacement of the nodes in each state, m.
-    values : (k,) array
-        Time in s, or load, of each state, ascending.
-    fields : mapping of name to (k, P) array
-        Further fields in each state, for VTU files.
-    name : str
-        Name of the body.
-    """
-
-    points: np.ndarray
-    cells: np.ndarray
-    displacement: np.ndarray
-    values: np.ndarray
+    points: np.ndarray  # (P, 3), nodes at rest in m, z up
+    cells: np.ndarray  # int (T, 3) triangles, counter-clockwise seen from outside, or (T, 2) pieces of a line
+    displacement: np.ndarray  # (k, P, 3), of the nodes in each state, m
+    values: np.ndarray  # (k,), time in s, or load, of each state, ascending
     name: str = "body"
-    fields: dict[str, np.ndarray] = field(default_factory=dict)
+    fields: dict[str, np.ndarray] = field(default_factory=dict)  # further fields (k, P), for VTU
 
     def __post_init__(self) -> None:
         points, states = np.asarray(self.points, dtype=float), np.asarray(self.displacement, dtype=float)
@@ -102,27 +86,11 @@ def write_glb(
     card: dict[str, Any] | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Write a series of shapes as GLB and return its path.
+    """Write a series of shapes as a ``.glb`` file and return its path.
 
-    Parameters
-    ----------
-    series : ShapeSeries
-        Rest and states.
-    path : path
-        File, ending in ``.glb``.
-    targets : int
-        Most states that become morph targets; a longer series is thinned, since some viewers show no more than eight.
-    seconds : float
-        Duration of the stroke; it goes on to the last state and back.
-    card : mapping, optional
-        Model card for the file's `extras`.
-    overwrite : bool
-        True replaces files whatever they are; by default those alone that an earlier export wrote.
-
-    Raises
-    ------
-    UsageError
-        For another ending, or a file that exists and that no export wrote.
+    At most `targets` states become morph targets; a longer series is thinned, since some viewers show no more than
+    eight. The stroke to the last state takes `seconds` and comes back. `card` is a model card for the file's `extras`.
+    `overwrite` replaces files whatever they are; by default those alone that an earlier export wrote.
     """
     require_outputs([path], endings=(".glb",), overwrite=overwrite)
     return write_file(path, glb_bytes(series, targets=targets, seconds=seconds, card=card))

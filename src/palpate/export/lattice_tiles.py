@@ -48,16 +48,9 @@ def cut_tiles(table: np.ndarray) -> np.ndarray:
 
 
 def lattice_table(whole: np.ndarray, exponent: int, outer: int, inner: int) -> Table | None:
-    """Return the table whole · 2^exponent as digits; None where its numbers are too large for them.
+    """Return the table whole (i, j, k) · 2^exponent as digits; None where its numbers are too large for them.
 
-    Parameters
-    ----------
-    whole : (i, j, k) int array
-        Whole numbers.
-    exponent : int
-        Of the power of two.
-    outer, inner : int
-        Numbers that fill most of the tiles which are of one number.
+    `outer` and `inner` are the numbers that fill most of the tiles which are of one number.
     """
     tiles = cut_tiles(whole).reshape(-1, SIDE**3).astype(np.int64)
     levels = [(tiles == level).all(axis=1) for level in (outer, inner)]

@@ -58,11 +58,6 @@ def add_body(graph: Graph, energy: LearntEnergy) -> None:
     """Add the input ``x`` (N, n), and the outputs `BODY_OUTPUTS` of an energy, to a graph.
 
     ``deviation`` is left out where the body has no posterior.
-
-    Raises
-    ------
-    UsageError
-        If there is no ONNX form of the baseline.
     """
     baseline, net = energy.baseline, energy.network
     n, D = len(energy.inputs), energy.baseline.directions

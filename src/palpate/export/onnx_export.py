@@ -35,21 +35,11 @@ COLUMNS |= {"amplitude": slice(15, 16), "slope": slice(16, 19), "deviation": sli
 
 @dataclass(frozen=True)
 class ExportedOnnx:
-    """A model that was written, and how far it is from palpate.
-
-    Attributes
-    ----------
-    file : Path
-        The model.
-    hash : str
-        SHA-256 of the weights, as in every other export of the body.
-    comparison : Comparison, optional
-        How far it is from palpate; None where ONNX Runtime is not installed, or nothing was to be compared.
-    """
+    """A model that was written, and how far it is from palpate."""
 
     file: Path
-    hash: str
-    comparison: Comparison | None
+    hash: str  # SHA-256 of the weights, as in every other export of the body
+    comparison: Comparison | None  # None where ONNX Runtime is not installed, or nothing was to be compared
 
 
 def export_onnx(
@@ -62,32 +52,11 @@ def export_onnx(
     tolerance: float = 1e-2,
     overwrite: bool = False,
 ) -> ExportedOnnx:
-    """Write a body or a network as an ONNX model, and compare it with palpate in ONNX Runtime if that is installed.
+    """Write a body or a network as NAME.onnx, and compare it with palpate in ONNX Runtime if that is installed.
 
-    Parameters
-    ----------
-    thing : Surrogate or Network
-        What goes out.
-    path : path
-        The file, NAME.onnx.
-    single : bool
-        Whether numbers are of 32 bits; the browser's runtimes take no others.
-    elastic : bool
-        Whether a memory is left out.
-    check : bool
-        Whether it is compared.
-    tolerance : float
-        Largest difference in single precision, relative to the largest value.
-    overwrite : bool
-        True replaces files whatever they are; by default those alone that an earlier export wrote.
-
-    Raises
-    ------
-    UsageError
-        If the package onnx is missing, the baseline or the memory has no ONNX form, the name does not end in
-        ``.onnx``, or a file exists that no export wrote.
-    AccuracyError
-        If it does not answer as palpate does; nothing is written.
+    `single` gives numbers of 32 bits, the only ones that the browser's runtimes take; `elastic` leaves a memory out.
+    `tolerance` is the largest difference in single precision, relative to the largest value; beyond it nothing is
+    written. `overwrite` replaces files whatever they are; by default those alone that an earlier export wrote.
     """
     require_outputs([path], endings=(".onnx",), overwrite=overwrite)
     require_onnx()
@@ -165,15 +134,7 @@ def _compared(thing: Surrogate | Network, model: Any, precision: Precision) -> C
 
 
 class OnnxAsker:
-    """An ONNX Runtime session as an export is asked.
-
-    Parameters
-    ----------
-    session : InferenceSession
-        Of an exported body.
-    surrogate : Surrogate
-        The body.
-    """
+    """An ONNX Runtime session of an exported body, asked as every export is."""
 
     def __init__(self, session: Any, surrogate: Surrogate) -> None:
         self._session, self._energy = session, surrogate.energy

@@ -19,13 +19,7 @@ OPSET, IR = 13, 8
 
 
 def require_onnx() -> Any:
-    """Return the package onnx.
-
-    Raises
-    ------
-    UsageError
-        If it is not installed.
-    """
+    """Return the package onnx."""
     try:
         import onnx
     except ImportError:
@@ -124,17 +118,9 @@ class Value:
 
 
 class Graph:
-    """Operators and constants of one graph, of one precision.
+    """Operators and constants of one graph whose numbers are all float64, or all float32.
 
-    Parameters
-    ----------
-    dtype : type
-        float64 or float32, of all numbers.
-
-    Attributes
-    ----------
-    stage : str
-        What is being worked out: nodes bear its name, so that a runtime's error says where.
+    Nodes bear the name of the `stage` that is being worked out, so that a runtime's error says where.
     """
 
     def __init__(self, dtype: type[np.floating]) -> None:

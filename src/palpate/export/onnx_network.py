@@ -79,14 +79,9 @@ def _rows(network: Network) -> np.ndarray:
 
 
 def network_slopes(graph: Graph, network: Network, xi: Value, felt: int) -> Slopes:
-    """Return the only output of a network with its derivatives by the first inputs, which are not scaled.
+    """Return the only output of a network at scaled inputs xi (N, n) with its derivatives by the first `felt` of them.
 
-    Parameters
-    ----------
-    xi : Value
-        Scaled inputs (N, n).
-    felt : int
-        How many inputs the derivatives are by.
+    The derivatives are by inputs that are not scaled.
     """
     n, half, rows = len(network.inputs), network.scaling.input_half, _rows(network)
     tail, weights = rows[: 1 + n], rows[1 + n :]

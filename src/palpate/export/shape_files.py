@@ -35,23 +35,8 @@ def write_shapes(
 ) -> Path:
     """Write shapes; the ending decides: .pvd (VTU files for ParaView), .vtu (the last state alone), or .glb.
 
-    Parameters
-    ----------
-    series : ShapeSeries
-        Rest and states.
-    path : path
-        File to write.
-    targets : int
-        Most morph targets of a GLB file.
-    card : mapping, optional
-        Model card, for a GLB file.
-    overwrite : bool
-        True replaces files whatever they are; by default those alone that an earlier export wrote.
-
-    Raises
-    ------
-    UsageError
-        For another ending, or a file that exists and that no export wrote.
+    A GLB file has at most `targets` morph targets, and a model card. `overwrite` replaces files whatever they are; by
+    default those alone that an earlier export wrote.
     """
     ending = Path(path).suffix.lower()
     if ending == ".glb":
@@ -121,22 +106,7 @@ def _write_state(series: ShapeSeries, step: int, path: Path) -> None:
 
 
 def series_of_dataset(data: Dataset, rows: Sequence[int] | None = None, name: str = "body") -> ShapeSeries:
-    """Return the shapes of a dataset's solves, numbered by their rows.
-
-    Parameters
-    ----------
-    data : Dataset
-        Solves with a displacement; those that did not converge are left out.
-    rows : sequence of int, optional
-        Rows, in their order; by default all.
-    name : str
-        Name of the body.
-
-    Raises
-    ------
-    UsageError
-        If the dataset has no displacement, or nothing of the rows converged.
-    """
+    """Return the displaced shapes of a dataset's converged solves, numbered by their rows; of all rows by default."""
     if "displacement" not in data:
         raise UsageError(
             "The dataset has no displacement.", fix="Export it as a table: .csv, .parquet or .nc."
@@ -158,20 +128,7 @@ def series_of_dataset(data: Dataset, rows: Sequence[int] | None = None, name: st
 
 
 def series_of_surrogate(surrogate: Any, X: np.ndarray) -> ShapeSeries:
-    """Return the shapes of a learnt body at inputs X (k, n), numbered from 1.
-
-    Parameters
-    ----------
-    surrogate : Surrogate
-        A body that was learnt with its displacement.
-    X : (k, n) array
-        Inputs of the states, such as those of a stroke.
-
-    Raises
-    ------
-    UsageError
-        If it has no displacement.
-    """
+    """Return the shapes at inputs X (k, n), numbered from 1, of a body that was learnt with its displacement."""
     shown = surrogate.fields.get("displacement")
     if shown is None:
         raise UsageError(

@@ -29,21 +29,10 @@ def wasmtime_module() -> Any:
 
 
 class WasmCore:
-    """One body in the module that pages run.
+    """One body in the module that pages run in wasmtime.
 
-    Parameters
-    ----------
-    block : bytes
-        Of `WeightsBlock.to_bytes`.
-    fields : sequence of FieldSurrogate
-        The field whose coefficients the block knows, then those of further blocks; by default there is none.
-    further : sequence of bytes
-        Blocks with the arrays of one more field each.
-
-    Raises
-    ------
-    UsageError
-        If wasmtime is not installed, or the core refuses the block.
+    It is given by the bytes of a `WeightsBlock`. `fields` are the field whose coefficients that block knows, then those
+    of `further` blocks, each with the arrays of one more field.
     """
 
     def __init__(

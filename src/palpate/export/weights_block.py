@@ -72,21 +72,14 @@ _TILES = 5
 class Table:
     """One array of a block.
 
-    Attributes
-    ----------
-    values : array
-        Of float64, int32, float32 or int16; of a table in tiles its numbers (m,), or its digits as rows of characters
-        (uint8), see `palpate.export.lattice_tiles`.
-    shape : tuple of int
-        Up to four; of a table in tiles that of the whole table.
-    tiles : (t,) int32, optional
-        Where each tile's numbers begin; see `pp_gather` in core/surface.c. Of digits (3 + t/8,): what `lattice_tiles`
-        tells.
+    A table in tiles has its numbers (m,) as values, or its digits as rows of characters (uint8), see
+    `palpate.export.lattice_tiles`. Its `tiles` say where each tile's numbers begin, see `pp_gather` in core/surface.c;
+    of digits, (3 + t/8,), they hold what `lattice_tiles` tells.
     """
 
-    values: np.ndarray
-    shape: tuple[int, ...]
-    tiles: np.ndarray | None = None
+    values: np.ndarray  # float64, int32, float32 or int16; uint8 for digits
+    shape: tuple[int, ...]  # at most four sizes; of a table in tiles that of the whole table
+    tiles: np.ndarray | None = None  # (t,) int32
 
     @classmethod
     def of(cls, values: Any) -> Table:
@@ -350,21 +343,10 @@ def _root_table(root: np.ndarray, units: int) -> Table:
 
 
 def net_tables(network: Network, first: int, felt: int) -> dict[int, Table]:
-    """Return a network's arrays in the places from `first` on.
+    """Return a network's arrays in the places from `first` (its sizes) on.
 
-    Parameters
-    ----------
-    network : Network
-        Any; of one output where curvature is asked.
-    first : int
-        The place of its sizes.
-    felt : int
-        Inputs by which curvature is asked; 0 for none.
-
-    Raises
-    ------
-    UsageError
-        If it has more inputs, or its factors more rows, than the core's workspace.
+    Curvature is asked by the first `felt` inputs of a network of one output; 0 asks for none. The core's workspace
+    limits the numbers of inputs and of rows of the factors.
     """
     layout, scales, units, rows, modes, _ = packed(network, "double")
     n, e, latent = scales.shape[1], len(layout) - 1, rows.shape[1]

@@ -44,38 +44,20 @@ _PARTS = 5  # of the solves, one of which each disagreeing model lacks
 
 @dataclass(eq=False)
 class VarianceChoice:
-    """The state of the greedy choice by variance: the posterior, brought up to date after every pick.
+    """The state of the greedy choice by variance: the posterior, brought up to date after every pick."""
 
-    Attributes
-    ----------
-    P : (C·m, C·m) array
-        Posterior covariance of value and slopes, m = 1 + n of them at each of C places.
-    W : (C·k, C·m) array
-        A P: how an error of the force goes with value and slopes.
-    noise : (C, m) array
-        Noise variance of a solve's answers; infinite where it does not answer.
-    """
-
-    P: np.ndarray
-    W: np.ndarray
-    noise: np.ndarray
+    P: np.ndarray  # (C·m, C·m), posterior covariance of m = 1 + n values and slopes at C places
+    W: np.ndarray  # (C·k, C·m), A P: how an error of the force goes with value and slopes
+    noise: np.ndarray  # (C, m), noise variance of a solve's answers; infinite where it does not answer
 
     @classmethod
     def of(
         cls, process: GradientProcess, X: np.ndarray, maps: np.ndarray, weights: np.ndarray
     ) -> VarianceChoice:
-        """Return the state before the first pick.
+        """Return the state before the first pick, from a process conditioned on what is solved.
 
-        Parameters
-        ----------
-        process : GradientProcess
-            Conditioned on what is solved.
-        X : (C, n) array
-            Scaled inputs of the places.
-        maps : (C, k, m) array
-            A.
-        weights : (C, m) array
-            Weights of a solve's answers.
+        X (C, n) are scaled inputs of the places, `maps` (C, k, m) is A, `weights` (C, m) are those of a solve's
+        answers.
         """
         P = process.posterior(X)
         C, k, m = maps.shape
@@ -125,30 +107,14 @@ def choose_by_variance(
 ) -> list[int]:
     """Return the numbers of at most `count` groups, the best first.
 
-    Parameters
-    ----------
-    model : ForceModel
-        Of what is solved.
-    X : (C, n) array
-        Inputs of the candidates, all in contact, in their own units.
-    groups : sequence of int arrays
-        Rows of X that are solved together: single ones, or depth series.
-    costs : (G,) array
-        Cost of each group, in any unit.
-    count : int
-        Number of groups wanted.
-    taken : (T, n) array
-        Inputs that were solved or tried, from which the farthest are counted.
-    failed : (F, n) array, optional
-        Inputs in contact whose solves failed. They count as if they had answered, so that no others are chosen beside
-        them.
-    interest : (C,) array, optional
-        Weight of the squared error at each candidate; by default all count the same.
-    farthest_every : int
-        One pick in so many is the farthest; 0 for none.
-    largest : bool
-        Whether to take the largest expected error at the group itself in place of the fall over all places
-        (MacKay 1992), the rival that needs no integral.
+    X (C, n) are the inputs of the candidates, all in contact, in their own units; groups are rows of X that are solved
+    together: single ones, or depth series. `costs` (G,) of the groups have any unit; `interest` (C,) weighs the squared
+    error at each candidate, by default all the same.
+
+    `taken` (T, n) were solved or tried, and from them the farthest are counted: one pick in `farthest_every` is the
+    farthest, 0 for none. The inputs `failed` (F, n) in contact, whose solves failed, count as if they had answered, so
+    that no others are chosen beside them. `largest` takes the largest expected error at the group itself in place of
+    the fall over all places (MacKay 1992), the rival that needs no integral.
     """
     places = X if failed is None else np.concatenate([X, failed])
     maps = model.error_maps(places)
@@ -197,18 +163,10 @@ def _farthest_group(
 
 
 def image_distances(A: np.ndarray, B: np.ndarray, half: np.ndarray, images: Images) -> np.ndarray:
-    """Return the distance (N, P) of places A (N, n) from the nearest image of places B (P, n).
+    """Return the distance (N, P) of places A (N, n) from the nearest image of places B (P, n), all scaled inputs.
 
     Positions count in metres; a further input counts as much over its range as the position does over its mean range.
-
-    Parameters
-    ----------
-    A, B : (N, n), (P, n) arrays
-        Scaled inputs.
-    half : (n,) array
-        Half of each input's range.
-    images : Images
-        The group, on scaled inputs.
+    `half` (n,) is half of each input's range; the group of images acts on scaled inputs.
     """
     sizes = np.concatenate([half[:3], np.full(len(half) - 3, half[:3].mean())])
     least = np.full((len(A), len(B)), np.inf)
@@ -238,15 +196,7 @@ def choose_by_disagreement(model: ForceModel, X: np.ndarray, count: int) -> list
     """Return the numbers of `count` places of X (C, n) where models without a fifth of the solves disagree most.
 
     Within a batch a place counts less the nearer it is to one chosen before, within the mean distance of the solves.
-
-    Parameters
-    ----------
-    model : ForceModel
-        Of all solves; the others have its lengths.
-    X : (C, n) array
-        Inputs of the candidates, all in contact, in their own units.
-    count : int
-        Number of places wanted.
+    The places are all in contact, in their own units; the models without a fifth have the lengths of the whole one.
     """
     seen, process = model.process.seen, model.process
     part = np.arange(len(seen)) % _PARTS

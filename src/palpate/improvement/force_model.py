@@ -35,27 +35,13 @@ _CLIP = 30.0  # of ℓ: far from data an exponential must not overflow
 
 @dataclass(frozen=True, eq=False)
 class ForceModel:
-    """A process on ℓ with the baseline from which ℓ is counted.
-
-    Attributes
-    ----------
-    process : GradientProcess
-        Of ℓ, by scaled inputs.
-    baseline : Baseline
-        U₀.
-    inputs : n ranges
-        That scale the inputs.
-    largest : float
-        Largest force of the solves, N.
-    answered : (n,) bool
-        Inputs by which a solve answers the slope of the energy.
-    """
+    """A process on ℓ, by scaled inputs, with the baseline from which ℓ is counted."""
 
     process: GradientProcess
-    baseline: Baseline
-    inputs: tuple[Range, ...]
-    largest: float
-    answered: np.ndarray
+    baseline: Baseline  # U₀
+    inputs: tuple[Range, ...]  # n ranges that scale the inputs
+    largest: float  # largest force of the solves, N
+    answered: np.ndarray  # (n,) bool, inputs by which a solve answers the slope of the energy
 
     @classmethod
     def fit(
@@ -63,16 +49,8 @@ class ForceModel:
     ) -> ForceModel:
         """Return the model of solves; of the baseline's candidates the one that makes them most likely.
 
-        Parameters
-        ----------
-        solves : Solves
-            What was solved.
-        baseline : Baseline
-            Kind of baseline.
-        begin : ForceModel, optional
-            Model of fewer solves, from which the search begins.
-        seed : int
-            Decides which solves the search looks at, where there are many.
+        The search goes on from a model of fewer solves, if there is one, and looks at a part of many solves, which the
+        seed decides.
         """
         samples = EnergySamples.of(solves, baseline)
         images = images_of(solves, baseline) or no_symmetry(len(samples.inputs))

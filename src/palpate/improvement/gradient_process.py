@@ -47,21 +47,11 @@ _MIXED = 1e-9  # entry of a map that mixes two inputs
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Values and slopes of the scalar at N places.
+    """Values and slopes of the scalar at N places."""
 
-    Attributes
-    ----------
-    X : (N, n) array
-        Scaled inputs.
-    targets : (N, 1 + n) array
-        Value and slopes by the scaled inputs.
-    weights : (N, 1 + n) array
-        Weight of each; zero where it is not known.
-    """
-
-    X: np.ndarray
-    targets: np.ndarray
-    weights: np.ndarray
+    X: np.ndarray  # (N, n), scaled inputs
+    targets: np.ndarray  # (N, 1 + n), value and slopes by the scaled inputs
+    weights: np.ndarray  # (N, 1 + n); zero where a target is not known
 
     def __len__(self) -> int:
         return len(self.X)
@@ -79,14 +69,8 @@ def no_symmetry(inputs: int) -> Images:
 def covariance(A: np.ndarray, B: np.ndarray, lengths: np.ndarray, images: Images) -> np.ndarray:
     """Return the prior covariance (N, 1 + n, P, 1 + n) of values and slopes at A (N, n) with those at B (P, n).
 
-    Parameters
-    ----------
-    A, B : (N, n), (P, n) arrays
-        Scaled inputs.
-    lengths : (n,) array
-        l. Inputs that the group mixes need one length, else the function is not symmetric.
-    images : Images
-        The group, on scaled inputs.
+    All inputs are scaled, also for the group of images. Inputs that the group mixes need one length l of the (n,), else
+    the function is not symmetric.
     """
     n, inverse = A.shape[1], 1.0 / lengths**2
     out = np.zeros((len(A), 1 + n, len(B), 1 + n))
@@ -113,27 +97,14 @@ def covariance(A: np.ndarray, B: np.ndarray, lengths: np.ndarray, images: Images
 class GradientProcess:
     """The process, given observations.
 
-    Attributes
-    ----------
-    seen : Observations
-        What it is conditioned on.
-    images : Images
-        The group.
-    lengths : (n,) array
-        l, in scaled inputs.
-    noise : float
-        τ.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        From the properties, where rounding makes the covariance indefinite: the noise is too small then.
+    Where rounding makes the covariance indefinite, the properties raise `numpy.linalg.LinAlgError`: the noise is too
+    small then.
     """
 
-    seen: Observations
-    images: Images
-    lengths: np.ndarray
-    noise: float
+    seen: Observations  # what it is conditioned on
+    images: Images  # the group
+    lengths: np.ndarray  # (n,), l, in scaled inputs
+    noise: float  # τ
 
     @cached_property
     def _known(self) -> np.ndarray:
@@ -191,16 +162,8 @@ def fit_process(
 ) -> GradientProcess:
     """Return the process whose lengths and noise make the observations most likely, by a coarse search.
 
-    Parameters
-    ----------
-    seen : Observations
-        At least one place with a weight.
-    images : Images
-        The group.
-    begin : GradientProcess, optional
-        A process of fewer observations, from whose lengths and noise the search begins.
-    seed : int
-        Decides which observations the search looks at, where there are many.
+    The search goes on from a process of fewer observations, if there is one, and looks at a part of many observations,
+    which the seed decides. At least one place has a weight.
     """
     tied = tied_inputs(images)
     count = int(tied.max()) + 1

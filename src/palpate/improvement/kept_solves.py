@@ -81,37 +81,17 @@ class _Batch:
 
 @dataclass(eq=False)
 class KeptSolves:
-    """The solves of one purpose, to learn from or to judge by.
-
-    Attributes
-    ----------
-    problem : Problem
-        What is solved.
-    path : Path or None
-        Dataset that holds them, a folder ``NAME.zarr``; None keeps them in memory.
-    design : str
-        Name of the design, for the provenance: solves that were chosen, or points that were given.
-    options : mapping
-        Options of `palpate.sweep`, such as `cluster` and `progress`.
-    data : Dataset or None
-        All solves so far, those that failed among them.
-    """
+    """The solves of one purpose, to learn from or to judge by."""
 
     problem: Problem
-    path: Path | None = None
-    design: str = CHOSEN
-    options: dict[str, Any] = field(default_factory=dict)
-    data: Dataset | None = None
+    path: Path | None = None  # folder ``NAME.zarr`` of the dataset; None keeps it in memory
+    design: str = CHOSEN  # for the provenance: solves chosen, or points given
+    options: dict[str, Any] = field(default_factory=dict)  # of `palpate.sweep`
+    data: Dataset | None = None  # all solves so far, failed ones among them
 
     @classmethod
     def open(cls, problem: Problem, path: Path | None, *, design: str = CHOSEN, **options: Any) -> KeptSolves:
-        """Return what earlier runs have kept, and the whole of a batch that one of them began.
-
-        Raises
-        ------
-        UsageError
-            If the dataset at the path is of another problem.
-        """
+        """Return what earlier runs of the same problem have kept, and the whole of a batch that one of them began."""
         kept = cls(problem, path, design, options)
         if path is None:
             return kept
@@ -145,10 +125,7 @@ class KeptSolves:
     def add(self, groups: Groups) -> Dataset:
         """Solve further points and return them; each group is solved in order by one solver.
 
-        Raises
-        ------
-        SolverError
-            If more than half of the first points failed.
+        It is an error where more than half of the first points fail.
         """
         points, sizes = np.concatenate(groups), tuple(len(g) for g in groups)
         folder = self._folder

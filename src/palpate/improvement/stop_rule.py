@@ -18,15 +18,7 @@ __all__ = ["StopRule", "relative_errors"]
 
 
 def relative_errors(surrogate: Surrogate, unseen: Dataset | None) -> np.ndarray:
-    """Return the relative force errors (N,) of a surrogate on unseen solves that are stronger than a light touch.
-
-    Parameters
-    ----------
-    surrogate : Surrogate
-        What was learnt.
-    unseen : Dataset or None
-        Solves that it was not learnt from.
-    """
+    """Return the relative force errors (N,) of a surrogate on unseen solves that are stronger than a light touch."""
     if unseen is None or not len(unseen.ok):
         return np.empty(0)
     energy = surrogate.energy
@@ -43,25 +35,11 @@ class StopRule:
     A single error below the wanted one may be luck: many surrogates are judged by the same solves, and the search for
     each scatters. So the error must hold for two surrogates in a row, whether the second is kept or not, and the second
     is judged by all unseen solves.
-
-    Attributes
-    ----------
-    until : float
-        Wanted force error at the 95th percentile, relative.
-    limit : float
-        Time in s after which nothing more is begun.
-    most : int
-        Number of solves to learn from after which nothing more is begun.
-
-    Raises
-    ------
-    UsageError
-        For an error that is not between 0 and 1, or limits that are not positive.
     """
 
-    until: float
-    limit: float = math.inf
-    most: int = 400
+    until: float  # wanted force error at the 95th percentile, relative, between 0 and 1
+    limit: float = math.inf  # s after which nothing more is begun
+    most: int = 400  # solves to learn from after which nothing more is begun
 
     def __post_init__(self) -> None:
         if not 0 < self.until < 1:
@@ -86,18 +64,9 @@ class StopRule:
     ) -> str:
         """Return why to stop, as a sentence; empty to go on.
 
-        Parameters
-        ----------
-        errors : sequence of float
-            Force errors of the surrogates so far, at the 95th percentile; not-a-number where none was judged.
-        complete : bool
-            Whether all unseen solves have judged the last one.
-        solves : int
-            Solves to learn from.
-        seconds : float
-            Time since the beginning.
-        kept : float, optional
-            Error of the surrogate that is kept, to be told; by default that of the last one.
+        `errors` are those of the surrogates so far, at the 95th percentile, not-a-number where none was judged;
+        `complete` says whether all unseen solves have judged the last one. `solves` are those to learn from, `seconds`
+        the time since the beginning, `kept` the error of the surrogate that is kept, by default that of the last.
         """
         if self.is_reached(errors, complete=complete):
             told = errors[-1] if kept is None else kept

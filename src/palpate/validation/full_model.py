@@ -25,16 +25,9 @@ _SECANTS, _CLOSE = 12, 1e-8  # solves for a load at most, and share of the way t
 
 
 def stroke_moments(trace: Trace, most: int) -> np.ndarray:
-    """Return indices of the ticks that are solved, in order: at most `most`, evenly along the way of the hand.
+    """Return indices of at most `most` (≥ 2) ticks that are solved, in order, evenly along the way of the hand.
 
     Only moments count at which the body was held, without a fault, and was felt.
-
-    Parameters
-    ----------
-    trace : Trace
-        A recorded touch.
-    most : int
-        At least 2.
     """
     felt = trace.flag("grabbed") & (trace.ticks["fault"] == 0) & trace.ticks["wanted"].any(axis=1)
     rows = np.flatnonzero(felt)
@@ -61,27 +54,9 @@ def compare_full_model(
 ) -> TouchComparison:
     """Solve the full model under a recorded hand, and compare the force before limits and controller with it.
 
-    Parameters
-    ----------
-    trace : Trace
-        Of a body pressed by a probe, held by a pad, or, a beam, at the node of its single load.
-    problem : Problem
-        The body and its interaction, such as `palpate.study.Study.problem` returns.
-    limit : float
-        Time in s for all solves; the stroke is covered as evenly as the time allows.
-    most : int
-        Moments that are solved at most.
-    progress : callable
-        Told (done, total, seconds) every few seconds.
-    clock : callable
-        Time in s.
-
-    Raises
-    ------
-    UsageError
-        If the full model has other inputs, or the trace holds no touch.
-    SolverError
-        If no moment has an equilibrium, or not two of them are solved in time.
+    The trace is of a body pressed by a probe, held by a pad, or, a beam, at the node of its single load. `limit` is the
+    time in s for all solves; the stroke is covered as evenly as the time allows, with `most` moments at most.
+    `progress` takes (done, total, seconds) every few seconds.
     """
     answer = (
         _BeamUnderHand(trace, problem) if hasattr(problem, "load_nodes") else _BodyUnderHand(trace, problem)

@@ -134,30 +134,14 @@ def _refuse_band(name: str, band: tuple[float, ...]) -> None:
 
 @dataclass(frozen=True)
 class Criterion:
-    """One thing that is judged.
+    """One thing that is judged."""
 
-    Attributes
-    ----------
-    key : str
-        Its name in `Limits`.
-    label : str
-        The criterion in words, for tables.
-    kind : "scale", "metres", "share", "degrees" or "times"
-        How its figures are written.
-    good : float, (float, float) or None
-        A figure better than which nothing is gained, or between which; None where there is no such thing.
-    source : str
-        Where the threshold comes from.
-    fix : str
-        What to do about a miss.
-    """
-
-    key: str
-    label: str
-    kind: Kind
-    good: Bound | None
-    source: str
-    fix: str
+    key: str  # its name in `Limits`
+    label: str  # in words, for tables
+    kind: Kind  # how its figures are written
+    good: Bound | None  # nothing is gained beyond it, or between its two; None where there is none
+    source: str  # where the threshold comes from
+    fix: str  # what to do about a miss
 
 
 @dataclass(frozen=True)

@@ -24,17 +24,7 @@ Curve = Sequence[Mapping[str, Any]]
 
 
 def learning_curve(earlier: Curve, solves: int, validation: Validation) -> list[dict[str, Any]]:
-    """Return a curve with the point of a validation added; a point of as many solves is replaced.
-
-    Parameters
-    ----------
-    earlier : sequence of mapping
-        The curve of the surrogates learnt before, from fewer solves or more.
-    solves : int
-        Solves that the surrogate was learnt from.
-    validation : Validation
-        Its figures on unseen solves.
-    """
+    """Return the curve of earlier surrogates with a validation's point added; one of as many solves is replaced."""
     falling = [c for c in validation.checks if c.criterion.key in FALLING and math.isfinite(c.measured)]
     point: dict[str, Any] = {c.criterion.key: float(c.measured) for c in falling}
     kept = [dict(p) for p in earlier if p["solves"] != solves]
@@ -44,18 +34,7 @@ def learning_curve(earlier: Curve, solves: int, validation: Validation) -> list[
 def advice_on_solves(validation: Validation, solves: int, curve: Curve, command: str) -> str:
     """Return a sentence on the number of solves that would keep all limits; empty where more solves help nothing.
 
-    It has no full stop, since it may go on with what follows the command.
-
-    Parameters
-    ----------
-    validation : Validation
-        Figures of the surrogate.
-    solves : int
-        Solves that it was learnt from.
-    curve : sequence of mapping
-        Its learning curve, as `learning_curve` returns it.
-    command : str
-        Command that solves more; the number follows it.
+    It has no full stop, since it may go on with what follows the command; the number follows the command, too.
     """
     missed = [c for c in validation.failures if c.criterion.key in FALLING and math.isfinite(c.measured)]
     if not missed:

@@ -32,61 +32,27 @@ RADIUS = 1e-9  # relative: radii that are the same
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A model and the solves that it has never seen; what is missing is None and can't be judged.
-
-    Attributes
-    ----------
-    name : str
-        Of the model.
-    count : int
-        Unseen solves, or samples of unseen histories.
-    X, ranges : (N, n), n ranges
-        Inputs of the solves.
-    samples : ForceSamples, optional
-        Forces of the model and of finite elements at each solve.
-    units : int
-        Units of the network that answers the force.
-    turning : bool
-        Whether the force can point in more than one direction.
-    function, solves : TouchFunction and TouchSolves, optional
-        The force as a function of place.
-    data : Dataset, optional
-        The unseen rows of a dataset, with displacements.
-    field : FieldSurrogate, optional
-        The displacement that is shown.
-    loads : Surrogate, optional
-        Networks that answer by load.
-    body, histories : optional
-        A body with memory and unseen histories of it.
-    history : History, optional
-        Record of the sequential filter.
-    refined, strokes : optional
-        Solves on a refined mesh, and along strokes.
-    seed : int
-        Of random strokes and loops.
-    notes : tuple of str
-        What must be known of the test.
-    """
+    """A model and the solves that it has never seen; what is missing is None and can't be judged."""
 
     name: str
-    count: int
-    X: np.ndarray
+    count: int  # unseen solves, or samples of unseen histories
+    X: np.ndarray  # (N, n), inputs of the solves
     ranges: tuple[Range, ...]
-    samples: ForceSamples | None = None
-    units: int = 0
-    turning: bool = True
-    function: TouchFunction | None = None
+    samples: ForceSamples | None = None  # forces of the model and of finite elements at each solve
+    units: int = 0  # units of the network that answers the force
+    turning: bool = True  # whether the force can point in more than one direction
+    function: TouchFunction | None = None  # the force as a function of place
     solves: TouchSolves | None = None
-    data: Dataset | None = None
-    field: FieldSurrogate | None = None
-    loads: Surrogate | None = None
-    body: Surrogate | None = None
-    histories: LoadHistories | None = None
-    history: History | None = None
-    refined: TouchSolves | None = None
+    data: Dataset | None = None  # unseen rows, with displacements
+    field: FieldSurrogate | None = None  # the displacement that is shown
+    loads: Surrogate | None = None  # networks that answer by load
+    body: Surrogate | None = None  # a body with memory
+    histories: LoadHistories | None = None  # unseen, of that body
+    history: History | None = None  # record of the sequential filter
+    refined: TouchSolves | None = None  # on a refined mesh
     strokes: Sequence[TouchSolves] = ()
-    seed: int = 0
-    notes: tuple[str, ...] = ()
+    seed: int = 0  # of random strokes and loops
+    notes: tuple[str, ...] = ()  # what must be known of the test
 
     @classmethod
     def of(
@@ -99,13 +65,7 @@ class Subject:
         strokes: Sequence[TouchSolves] = (),
         seed: int = 0,
     ) -> Subject:
-        """Return a model with the rows of a test that it has not seen; for the parameters see `validate`.
-
-        Raises
-        ------
-        UsageError
-            If the solves are of another body, or of no use as a test.
-        """
+        """Return a model with the rows of a test that it has not seen; for the parameters see `validate`."""
         line = line_of(model)
         if line is not None and model.memory is not None:
             if not isinstance(test, LoadHistories):

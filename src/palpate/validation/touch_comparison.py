@@ -32,28 +32,14 @@ _AT_LEAST = 20  # solves beside a stroke that are shown, though none may be so n
 
 @dataclass(frozen=True, eq=False)
 class TouchComparison:
-    """Forces of two answers along one stroke.
+    """Forces of two answers along one stroke."""
 
-    Attributes
-    ----------
-    names : (str, str)
-        Of the reference and of the other.
-    time : (N,)
-        s, since the stroke began.
-    depth : (N,)
-        m; of the probe in the surface at rest, or how far what is held was displaced.
-    reference, other : (N, 3)
-        Force on the hand, N.
-    note : str
-        What must be known of the comparison; may be empty.
-    """
-
-    names: tuple[str, str]
-    time: np.ndarray
-    depth: np.ndarray
-    reference: np.ndarray
-    other: np.ndarray
-    note: str = ""
+    names: tuple[str, str]  # of the reference and of the other
+    time: np.ndarray  # (N,), s, since the stroke began
+    depth: np.ndarray  # (N,), m; of the probe in the surface at rest, or how far what is held was displaced
+    reference: np.ndarray  # (N, 3), force on the hand, N
+    other: np.ndarray  # (N, 3), N
+    note: str = ""  # what must be known of the comparison
 
     @cached_property
     def samples(self) -> ForceSamples:
@@ -115,19 +101,9 @@ class TouchComparison:
 
 
 def compare_traces(reference: Trace, other: Trace) -> TouchComparison:
-    """Compare two traces moment by moment, both since their first ticks.
+    """Compare two traces moment by moment, both since their first ticks, at the times of the reference.
 
-    Parameters
-    ----------
-    reference : Trace
-        Whose times count.
-    other : Trace
-        Its forces are taken at those times, in straight lines between its ticks.
-
-    Raises
-    ------
-    UsageError
-        If one of them holds no tick.
+    The other's forces are taken in straight lines between its ticks.
     """
     for trace in (reference, other):
         if len(trace) < 2:
@@ -153,25 +129,9 @@ def compare_traces(reference: Trace, other: Trace) -> TouchComparison:
 def solves_beside(
     trace: Trace, solves: TouchSolves, half: np.ndarray, most: int = 200
 ) -> tuple[np.ndarray, float]:
-    """Return the solves that lie beside a stroke, and how far from it the farthest of them is.
+    """Return rows (k,) of the solves beside a stroke, the nearest first, and the distance of the last, in half ranges.
 
-    Parameters
-    ----------
-    trace : Trace
-        Of a body pressed by a probe or held by a patch.
-    solves : TouchSolves
-        Of the same body.
-    half : (n,)
-        Half ranges of the inputs, by which distances count.
-    most : int
-        At most so many rows are returned, the nearest ones.
-
-    Returns
-    -------
-    rows : (k,) int
-        Indices of the solves, the nearest first.
-    distance : float
-        Of the last of them, in half ranges.
+    `half` (n,) are the half ranges of the inputs, by which distances count; at most `most` rows are returned.
     """
     held = trace.flag("grabbed") & (trace.ticks["fault"] == 0)
     places = np.hstack([trace.ticks["contact"], trace.parameters])[held]

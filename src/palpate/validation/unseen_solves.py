@@ -28,21 +28,14 @@ def force_jnd(size: np.ndarray) -> np.ndarray:
 class ForceSamples:
     """Forces on the hand or probe, asked for where each finite-element solve has it.
 
-    Attributes
-    ----------
-    hand : (N, k)
-        Where it is, m: the centre of a probe; or coordinates along the touched loads, the held node's displacement
-        plus the stretch of the virtual coupling.
-    truth, answer : (N, 3)
-        Force of the finite-element solve and of the model, N.
-    inside : (N,) bool
-        Whether the model called the place inside its trained range.
+    Where is the centre of a probe; or coordinates along the touched loads, the held node's displacement plus the
+    stretch of the virtual coupling.
     """
 
-    hand: np.ndarray
-    truth: np.ndarray
-    answer: np.ndarray
-    inside: np.ndarray
+    hand: np.ndarray  # (N, k), where it is, m
+    truth: np.ndarray  # (N, 3), of the finite-element solve, N
+    answer: np.ndarray  # (N, 3), of the model, N
+    inside: np.ndarray  # (N,) bool, the model called the place inside its trained range
 
     @property
     def size(self) -> np.ndarray:

@@ -238,16 +238,9 @@ def measure(subject: Subject, limits: Limits | None = None) -> Validation:
 
 
 def checks(figures: Any, limits: Limits, fixes: Mapping[str, str]) -> tuple[Check, ...]:
-    """Compare the values of figures with limits, in the order of `CRITERIA`.
+    """Compare figures with limits, in the order of `CRITERIA`; a limit of None asks nothing.
 
-    Parameters
-    ----------
-    figures : iterable of Figure
-        Figures that were measured.
-    limits : Limits
-        A limit of None asks nothing.
-    fixes : mapping of names of limits to advice after a miss
-        Where it differs from the advice of the criterion.
+    `fixes` has advice after a miss by limit's name, where it differs from the criterion's.
     """
     measured = {key: value for figure in figures for key, value in figure.measured().items()}
     found = []

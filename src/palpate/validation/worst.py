@@ -17,21 +17,11 @@ OUTER = 0.05
 
 @dataclass(frozen=True)
 class Worst:
-    """The sample at which a figure is largest.
+    """The sample at which a figure is largest."""
 
-    Attributes
-    ----------
-    value : float
-        The figure at this sample.
-    inputs : tuple of (name, value, unit)
-        Inputs of this sample.
-    place : str
-        Node or output of the sample; may be empty.
-    """
-
-    value: float
-    inputs: tuple[tuple[str, float, str], ...]
-    place: str = ""
+    value: float  # the figure at this sample
+    inputs: tuple[tuple[str, float, str], ...]  # name, value, unit of each
+    place: str = ""  # node or output; may be empty
 
     @classmethod
     def of(cls, value: float, x: np.ndarray, ranges: Sequence[Range], place: str = "") -> Worst:

@@ -18,10 +18,7 @@ _BINARY = "application/octet-stream"
 class BinaryAnswers:
     """Answers of bytes by their name, made and compressed beside the server's thread, where the hand is heard.
 
-    Parameters
-    ----------
-    keep : bool
-        Whether an answer is made once for all who ask; otherwise each time.
+    With `keep` an answer is made once for all who ask; otherwise each time.
     """
 
     def __init__(self, *, keep: bool) -> None:

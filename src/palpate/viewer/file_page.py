@@ -40,11 +40,8 @@ from palpate.viewer.page_model import PageModel
 __all__ = ["ExportedPage", "export_html", "html_page"]
 
 STATIC = Path(__file__).parent / "static"
-DRAWN_BY_THE_PAGE = (
-    FIELD + 4,
-    FIELD + 6,
-    FIELD + 7,
-)  # modes and moving nodes: the page sums the shape up itself
+# modes and moving nodes: the page sums the shape up itself
+DRAWN_BY_THE_PAGE = (FIELD + 4, FIELD + 6, FIELD + 7)
 LARGEST = 5_000_000  # bytes of a file, more than which no further field makes it
 DEEP = 2.0  # of the deepest trained depth, at which the body lets go
 RATE = 60.0  # Hz, of the pictures
@@ -61,49 +58,22 @@ class _Settings(NamedTuple):
 
 @dataclass(frozen=True)
 class ExportedPage:
-    """A page that was written, and how far it is from palpate.
-
-    Attributes
-    ----------
-    file : Path
-        The page.
-    hash : str
-        SHA-256 of the weights.
-    comparison : Comparison, optional
-        How far it is from palpate; None where wasmtime is not installed, or nothing was to be compared.
-    left_out : tuple of str
-        Fields that are not in it, since it would be larger than 5 MB, or since they are on other nodes than the first.
-    """
+    """A page that was written, and how far it is from palpate."""
 
     file: Path
-    hash: str
-    comparison: Comparison | None
-    left_out: tuple[str, ...] = ()
+    hash: str  # SHA-256 of the weights
+    comparison: Comparison | None  # None where wasmtime is not installed, or nothing was to be compared
+    left_out: tuple[str, ...] = ()  # fields too large for 5 MB, or on other nodes than the first
 
 
 def export_html(
     surrogate: Surrogate, path: str | os.PathLike[str], *, check: bool = True, overwrite: bool = False
 ) -> ExportedPage:
-    """Write a learnt body as one HTML file, and compare what it answers with palpate if wasmtime is installed.
+    """Write a learnt body as NAME.html, and compare what it answers with palpate if wasmtime is installed.
 
-    Parameters
-    ----------
-    surrogate : Surrogate
-        A body that a probe presses or a pad holds.
-    path : path
-        The file, NAME.html.
-    check : bool
-        Whether it is compared.
-    overwrite : bool
-        True replaces files whatever they are; by default those alone that an earlier export wrote.
-
-    Raises
-    ------
-    UsageError
-        If the body is drawn as a line, a part of it has no C source, the name does not end in ``.html``, or a file
-        exists that no export wrote.
-    AccuracyError
-        If the core does not answer as palpate does; nothing is written.
+    A probe presses the body or a pad holds it; a body drawn as a line has no page. Where the core does not answer as
+    palpate does, nothing is written. `overwrite` replaces files whatever they are; by default those alone that an
+    earlier export wrote.
     """
     require_outputs([path], endings=(".html", ".htm"), overwrite=overwrite)
     page = _Page.of(surrogate)
@@ -119,38 +89,20 @@ def export_html(
 
 
 def html_page(surrogate: Surrogate) -> str:
-    """Return a learnt body as one HTML file.
-
-    Raises
-    ------
-    UsageError
-        If the body is drawn as a line, or a part of it has no C source.
-    """
+    """Return a learnt body as one HTML file; one that is drawn as a line, or has a part without C source, has none."""
     return _Page.of(surrogate).text
 
 
 @dataclass(frozen=True, eq=False)
 class _PageField:
-    """A field of a page.
-
-    Attributes
-    ----------
-    shown, rounded : FieldSurrogate
-        As it is, and as the page holds it.
-    block : WeightsBlock
-        Its weights without modes; of the first field those of the body, too.
-    facts : mapping
-        What the numbers of its modes mean.
-    weights, modes : str
-        Block and modes as they stand in the file.
-    """
+    """A field of a page, as it is (`shown`) and as the page holds it (`rounded`)."""
 
     shown: FieldSurrogate
     rounded: FieldSurrogate
-    block: WeightsBlock
-    facts: dict[str, Any]
-    weights: str
-    modes: str
+    block: WeightsBlock  # its weights without modes; of the first field those of the body, too
+    facts: dict[str, Any]  # what the numbers of its modes mean
+    weights: str  # the block as it stands in the file
+    modes: str  # the modes as they stand in the file
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,14 +52,9 @@ WARNINGS = 20.0  # lines of the log about refusals at once, and one per second i
 
 
 class Token:
-    """The secret that whoever may see the page has to show.
+    """The secret that whoever may see the page has to show: 144 random bits as 24 letters, new for each object.
 
-    Attributes
-    ----------
-    name : str
-        Name of the cookie. Cookies of one host are shared by its ports, so it differs from port to port.
-    secret : str
-        144 random bits as 24 letters, new for each object.
+    Cookies of one host are shared by its ports, so the cookie's `name` differs from port to port.
     """
 
     def __init__(self, name: str = "palpate") -> None:
@@ -96,15 +91,7 @@ def _path(scope: Scope) -> str:
 
 
 def refusal(kind: str, headers: Headers) -> str:
-    """Return why a request is refused whatever it shows, or "" where it is not.
-
-    Parameters
-    ----------
-    kind : str
-        ``"http"`` or ``"websocket"``.
-    headers : Headers
-        Of the request.
-    """
+    """Return why a request ("http" or "websocket") is refused whatever it shows, or "" where it is not."""
     hosts = headers.getlist("host")
     if len(hosts) != 1 or _hostname(hosts[0]) not in LOOPBACK:
         return f"the host {', '.join(hosts) or 'not given'} is not this machine"
@@ -123,15 +110,7 @@ def _hostname(host: str) -> str:
 
 
 class Guard:
-    """ASGI middleware: refuses strangers, paces requests, and puts `HEADERS` on every answer.
-
-    Parameters
-    ----------
-    app : ASGI application
-        What is guarded.
-    token : Token, optional
-        The secret to show; by default none is asked for.
-    """
+    """ASGI middleware: refuses strangers, paces requests, and puts `HEADERS` on every answer; a token is optional."""
 
     def __init__(self, app: ASGIApp, token: Token | None = None) -> None:
         self._app, self._token = app, token

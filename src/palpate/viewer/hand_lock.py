@@ -39,13 +39,7 @@ class _Heard:
 
 
 class HandLock:
-    """The pages heard of, the one that holds the hand, and the parameters in force.
-
-    Attributes
-    ----------
-    parameters : (p,)
-        Values of the untouched inputs, SI.
-    """
+    """The pages heard of, the one that holds the hand, and the `parameters` (p,) in force: the untouched inputs, SI."""
 
     def __init__(self, parameters: np.ndarray) -> None:
         self.parameters = parameters

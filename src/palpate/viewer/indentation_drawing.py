@@ -47,19 +47,9 @@ class _Depths:
 
 
 class IndentationDrawing:
-    """Indentations on the surface of a body that yields.
+    """Indentations on the surface of a body whose memory keeps them at places.
 
-    Parameters
-    ----------
-    body : Touchable
-        One whose memory keeps indentations at places.
-    points : (m, 3)
-        Of the touched surface at rest, m.
-
-    Attributes
-    ----------
-    normals : (m, 3)
-        Outward unit normals there.
+    `points` (m, 3) are those of the touched surface at rest, m; `normals` (m, 3) the outward unit normals there.
     """
 
     def __init__(self, body: Touchable, points: np.ndarray) -> None:

@@ -50,32 +50,15 @@ class _Lists:
 
 @dataclass(frozen=True, eq=False)
 class _Order:
-    """Triangles and points in the order of the file.
+    """Triangles and points in the order of the file."""
 
-    Attributes
-    ----------
-    points : (n,)
-        The point of before that stands at each place.
-    places : (n,)
-        Place of each point of before.
-    triangles : (t,)
-        The triangle of before that stands at each place.
-    gates, thirds : (t,)
-        How many triangles back each one's gate is, times three, plus the edge; 0 for none. Its third corner, counted
-        back from the newest point.
-    starts : (3 s,)
-        Corners of the triangles without a gate, counted so.
-    parents : (n, 3)
-        a, b and d of each point; −1 for those that none are known of.
-    """
-
-    points: np.ndarray
-    places: np.ndarray
-    triangles: np.ndarray
-    gates: np.ndarray
-    thirds: np.ndarray
-    starts: np.ndarray
-    parents: np.ndarray
+    points: np.ndarray  # (n,), the point of before that stands at each place
+    places: np.ndarray  # (n,), place of each point of before
+    triangles: np.ndarray  # (t,), the triangle of before that stands at each place
+    gates: np.ndarray  # (t,), how many triangles back the gate is, times three, plus the edge; 0 for none
+    thirds: np.ndarray  # (t,), the third corner, counted back from the newest point
+    starts: np.ndarray  # (3 s,), corners of the triangles without a gate, counted so
+    parents: np.ndarray  # (n, 3), a, b and d of each point; −1 where none are known
 
 
 def _order_of(triangles: np.ndarray, count: int) -> _Order:
@@ -143,15 +126,7 @@ def rounded_points(points: np.ndarray, step: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class PackedSurface:
-    """A surface as bytes, and the order in which its points stand there.
-
-    Attributes
-    ----------
-    facts : mapping
-        What the numbers mean, for JSON.
-    data : bytes
-        The numbers.
-    """
+    """A surface as bytes, and the order of its points there; `facts` say, for JSON, what the numbers mean."""
 
     facts: dict[str, Any]
     data: bytes
@@ -177,14 +152,9 @@ class PackedSurface:
         return cls(facts, lists.data, order)
 
     def field(self, modes: Modes, scales: np.ndarray) -> tuple[dict[str, Any], bytes]:
-        """Return what the numbers of a field mean, and the numbers.
+        """Return what the numbers of a field mean, and the numbers, from its modes at the surface's points.
 
-        Parameters
-        ----------
-        modes : Modes
-            Rest and modes at the surface's points.
-        scales : (1 + k,) array
-            What 1 stands for in the rest and in each mode.
+        `scales` (1 + k,) are what 1 stands for in the rest and in each mode.
         """
         lists, order = _Lists(), self._order
         rows = np.vstack([np.ravel(modes.rest), np.reshape(modes.modes, (-1, np.size(modes.rest)))])

@@ -60,22 +60,9 @@ class HandSettings(Protocol):
 class PageModel:
     """A touchable body with all that its pages are told and sent.
 
-    Parameters
-    ----------
-    body : Touchable
-        The learnt body as a hand finds it.
-    version : int
-        Counts the surrogates of one body, where a later one takes the place of the one before.
-    centre : (3,) array, optional
-        The device's centre in the body's coordinates, m; by default the body's own. A later surrogate has that of the
-        first, because the loop keeps its workspace.
-
-    Attributes
-    ----------
-    body, version, centre
-        As given.
-    surface : Surface, optional
-        At rest; None for a body drawn as a line.
+    `version` counts the surrogates of one body, where a later one takes the place of the one before. `centre` (3,) is
+    the device's centre in the body's coordinates, m, by default the body's own; a later surrogate has that of the
+    first, because the loop keeps its workspace. `surface` is the body's at rest, None for one drawn as a line.
     """
 
     def __init__(self, body: Touchable, version: int = 1, centre: np.ndarray | None = None) -> None:
@@ -102,16 +89,9 @@ class PageModel:
         return trust_map(self._drawing)
 
     def hello(self, state: HandSettings, rate: float, device: str = "") -> Hello:
-        """Return what every page is told first.
+        """Return what every page is told first; `rate` is that of the loop in Hz.
 
-        Parameters
-        ----------
-        state : HandSettings
-            A tick of the loop, or other settings.
-        rate : float
-            Ticks per second that the loop aims at, Hz.
-        device : str
-            Name of the device that the hand holds; empty where it is a page's own.
+        `device` names the device that the hand holds; it is empty where it is a page's own.
         """
         body = self.body
         return Hello(
@@ -140,18 +120,9 @@ class PageModel:
         )
 
     def frame(self, loop: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Frame:
-        """Return a picture.
+        """Return a picture of a tick; `parameters` (p,) are the inputs that the hand doesn't supply.
 
-        Parameters
-        ----------
-        loop : mapping
-            The fields of `Frame` that tell of the loop and the page, whatever the body.
-        state : State
-            The tick that is drawn.
-        held : bool
-            Whether a hand holds or presses the body.
-        parameters : (p,)
-            The inputs that the hand doesn't supply.
+        `loop` has the fields of `Frame` that tell of the loop and the page, whatever the body.
         """
         drawn = self._drawing.frame(state, held, parameters)
         felt = {"depth": state.depth, "stiffness": state.stiffness if held else 0.0}

@@ -33,18 +33,9 @@ class Recordable(Protocol):
 
 
 class PageRecording:
-    """Starts and stops recordings of one loop for its pages.
+    """Starts and stops recordings of one loop for its pages, in files of a folder whose names begin with the body's.
 
-    Parameters
-    ----------
-    loop : Recordable
-        The real-time process.
-    folder : path
-        Where the files go.
-    name : str
-        Of the body; the files' names begin with it.
-    tell : callable
-        Sends a `Recording` to all pages.
+    `tell` sends a `Recording` to all pages.
     """
 
     def __init__(

@@ -62,10 +62,8 @@ logger = logging.getLogger("palpate.viewer")
 
 MOST_PAGES = 32
 PATIENCE = 1.0  # s that a page has to take news
-MESSAGES, MESSAGES_AT_ONCE = (
-    20.0,
-    200.0,
-)  # of a page, per second and at once; a start after long brushing takes fifty
+# messages of a page, per second and at once; a start after long brushing takes fifty
+MESSAGES, MESSAGES_AT_ONCE = 20.0, 200.0
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
 
 

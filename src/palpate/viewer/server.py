@@ -51,10 +51,7 @@ def application(session: Session) -> Starlette:
 def body_routes(session: Callable[[], Session | None]) -> list[BaseRoute]:
     """Return the routes of a touchable body: its websocket, surface, fields, and the map of trust.
 
-    Parameters
-    ----------
-    session : callable
-        Returns the session of the body, or None as long as there is none.
+    `session` returns the session of the body, or None as long as there is none.
     """
     answers = BinaryAnswers(keep=True)
 

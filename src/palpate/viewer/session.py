@@ -123,18 +123,8 @@ class Page:
 class Session:
     """A body, its real-time process and the pages that look at it.
 
-    Parameters
-    ----------
-    model : PageModel
-        The body as its pages see it.
-    loop : LoopLike
-        The real-time process.
-    clock : function
-        Time in s, for the pages' shares.
-    recordings : path, optional
-        Folder for what pages record; by default nothing is recorded.
-    device : str
-        The device that the hand holds, in words, where it has no name of its own; empty where pages steer the hand.
+    `clock` gives the time in s for the pages' shares. Nothing is recorded without a folder for `recordings`. `device`
+    is the device that the hand holds, in words, where it has no name of its own; empty where pages steer the hand.
     """
 
     def __init__(

@@ -30,55 +30,25 @@ VON_MISES, STRETCH = "von Mises stress", "largest principal stretch"
 
 @dataclass(frozen=True, eq=False)
 class ShownStep:
-    """One state of a body.
+    """One state of a body."""
 
-    Attributes
-    ----------
-    displacement : (node, 3) array
-        Of every node, m.
-    values : {name: (node,) array}
-        Quantities to colour by, besides the displacement.
-    ball : (centre, radius), optional
-        The probe, m.
-    label : str
-        Name of the state beside its slider; its number where there is none.
-    figures : {name: words}
-        What is known of the state, in words.
-    """
-
-    displacement: np.ndarray
-    values: Mapping[str, np.ndarray] = field(default_factory=dict)
-    ball: tuple[np.ndarray, float] | None = None
-    label: str = ""
-    figures: Mapping[str, str] = field(default_factory=dict)
+    displacement: np.ndarray  # (node, 3), m
+    values: Mapping[str, np.ndarray] = field(default_factory=dict)  # (node,) each, to colour by
+    ball: tuple[np.ndarray, float] | None = None  # centre and radius of the probe, m
+    label: str = ""  # beside the slider; the step's number where there is none
+    figures: Mapping[str, str] = field(default_factory=dict)  # what is known of it, in words
 
 
 @dataclass(frozen=True, eq=False)
 class ShownBody:
-    """A body's surface and its states.
+    """A body's surface and its states."""
 
-    Attributes
-    ----------
-    name : str
-        Title of the page.
-    rest : (node, 3) array
-        Positions at rest, m, z up.
-    triangles : (t, 3) int array
-        Outer surface, counter-clockwise as seen from outside.
-    steps : sequence of ShownStep
-        Its states, in order; at least one.
-    units : {name: unit}
-        Of the steps' values.
-    fixed : (t,) bool array
-        Which triangles don't move.
-    """
-
-    name: str
-    rest: np.ndarray
-    triangles: np.ndarray
-    steps: Sequence[ShownStep]
-    units: Mapping[str, str] = field(default_factory=dict)
-    fixed: np.ndarray | None = None
+    name: str  # title of the page
+    rest: np.ndarray  # (node, 3), positions at rest, m, z up
+    triangles: np.ndarray  # (t, 3) int, outer surface, counter-clockwise as seen from outside
+    steps: Sequence[ShownStep]  # at least one
+    units: Mapping[str, str] = field(default_factory=dict)  # of the steps' values
+    fixed: np.ndarray | None = None  # (t,) bool, triangles that don't move
 
     def __post_init__(self) -> None:
         rest, triangles = np.asarray(self.rest), np.asarray(self.triangles)
@@ -151,21 +121,9 @@ class ShownBody:
 
 
 def body_of(source: Any, name: str = "") -> ShownBody:
-    """Return a body to look at.
+    """Return a body to look at, of a ShownBody, solutions, a Dataset, or the path of a .vtu, .pvd or .zarr.
 
-    Parameters
-    ----------
-    source : ShownBody, solution, sequence of solutions, Dataset, or path of a .vtu, .pvd or .zarr
-        Solutions that did not converge are left out.
-    name : str
-        Title of the page.
-
-    Raises
-    ------
-    UsageError
-        If there is nothing to show.
-    FileFormatError
-        If the file can't be read.
+    Solutions that did not converge are left out. `name` is the title of the page.
     """
     if isinstance(source, ShownBody):
         return source
@@ -244,13 +202,7 @@ MOST_STEPS = 400  # of a dataset: a longer slider can't be moved by one
 
 
 def body_of_file(path: Path, name: str = "") -> ShownBody:
-    """Read a body from a .vtu, a .pvd or a dataset's folder.
-
-    Raises
-    ------
-    FileFormatError
-        If there is none, or nothing that can be shown.
-    """
+    """Read a body from a .vtu, a .pvd or a dataset's folder."""
     if not path.exists():
         raise _unreadable(path, "There is no such file.")
     if path.is_dir():
@@ -263,13 +215,7 @@ def body_of_file(path: Path, name: str = "") -> ShownBody:
 
 
 def body_of_dataset(dataset: Any, name: str) -> ShownBody:
-    """Return the converged samples of a solid's dataset as a body, at most 400 of them.
-
-    Raises
-    ------
-    UsageError
-        If it is no solid's dataset, or none of its samples converged.
-    """
+    """Return the converged samples of a solid's dataset as a body, at most 400 of them."""
     data = dataset.data
     if "triangles" not in data:
         raise UsageError(

@@ -30,86 +30,37 @@ __all__ = ["PartChoices", "ShownPart", "as_wish", "choices_of"]
 
 @dataclass(frozen=True, eq=False)
 class PartChoices:
-    """The choices of a person for a part.
+    """The choices of a person for a part."""
 
-    Attributes
-    ----------
-    material : str
-        Name of a material of the library; empty where law and constants are given.
-    law : str
-        Law of an own material.
-    young : float
-        Its Young's modulus, Pa.
-    poisson : float
-        Its Poisson's ratio.
-    radius : float
-        Radius of the ball, m.
-    depth : float
-        Largest depth of the ball, m.
-    held, touched : (k,) int array or None
-        Triangles of the part that are held, and that are touched; None where nobody has changed what was chosen
-        at first.
-    """
-
-    material: str
-    law: str
-    young: float
+    material: str  # name in the library; empty where law and constants are given
+    law: str  # of an own material
+    young: float  # Pa
     poisson: float
-    radius: float
-    depth: float
-    held: np.ndarray | None = None
-    touched: np.ndarray | None = None
+    radius: float  # of the ball, m
+    depth: float  # largest depth of the ball, m
+    held: np.ndarray | None = None  # (k,) int, triangles; None: as chosen at first
+    touched: np.ndarray | None = None  # (k,) int, triangles; None: as chosen at first
 
 
 @dataclass(frozen=True, eq=False)
 class ShownPart:
-    """A part to set up: its surface as triangles, its faces, and the choices made for it at first.
+    """A part to set up: its surface as triangles, its faces, and the choices made for it at first."""
 
-    Attributes
-    ----------
-    name : str
-        Title of the page.
-    file, unit : str
-        Name of the file, and unit of its numbers; empty where the file states it.
-    points : (n, 3) array
-        Corners of the triangles, m, z up.
-    triangles : (t, 3) int array
-        Outer surface, counter-clockwise as seen from outside.
-    face_of : (t,) int array
-        Index into `faces` for each triangle.
-    faces : tuple of str
-        Names of the faces.
-    held, touched : (t,) bool arrays
-        Triangles that are held, and touched, unless a person chooses others.
-    choices : PartChoices
-        All other choices at first.
-    units : tuple of str
-        Units in which the file's numbers could be taken instead.
-    whole : bool
-        Whether faces can be picked as a whole only, as those of a CAD file.
-    materials : mapping of name to words
-        Materials that can be asked for by name, and what there is to say of each.
-    laws : tuple of str
-        Laws that take Young's modulus and Poisson's ratio.
-    notes : tuple of str
-        What else there is to say of the file, in sentences.
-    """
-
-    name: str
+    name: str  # title of the page
     file: str
-    unit: str
-    points: np.ndarray
-    triangles: np.ndarray
-    face_of: np.ndarray
+    unit: str  # of the file's numbers; empty where the file states it
+    points: np.ndarray  # (n, 3), corners of the triangles, m, z up
+    triangles: np.ndarray  # (t, 3) int, outer surface, counter-clockwise as seen from outside
+    face_of: np.ndarray  # (t,) int, index into `faces`
     faces: tuple[str, ...]
-    held: np.ndarray
-    touched: np.ndarray
+    held: np.ndarray  # (t,) bool, unless a person chooses others
+    touched: np.ndarray  # (t,) bool, unless a person chooses others
     choices: PartChoices
-    units: tuple[str, ...] = ()
-    whole: bool = False
-    materials: Mapping[str, str] = field(default_factory=dict)
-    laws: tuple[str, ...] = ("neo-hookean",)
-    notes: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()  # in which the file's numbers could be taken instead
+    whole: bool = False  # faces can be picked as a whole only, as those of a CAD file
+    materials: Mapping[str, str] = field(default_factory=dict)  # what to say of each, by name
+    laws: tuple[str, ...] = ("neo-hookean",)  # that take Young's modulus and Poisson's ratio
+    notes: tuple[str, ...] = ()  # what else to say of the file, in sentences
 
     @cached_property
     def surface(self) -> Surface:
@@ -176,20 +127,7 @@ def as_wish(choices: PartChoices) -> StartWish:
 
 
 def choices_of(wish: StartWish, held: np.ndarray | None, touched: np.ndarray | None) -> PartChoices:
-    """Return the choices that a page has sent.
-
-    Parameters
-    ----------
-    wish : StartWish
-        All that stands in the page's form.
-    held, touched : (k,) int array or None
-        Triangles that were picked; None where nothing was changed.
-
-    Raises
-    ------
-    UsageError
-        If a quantity is no number with a unit of its kind, or is not above zero.
-    """
+    """Return the choices that a page has sent; `held` and `touched` are triangles (k,), None where nothing changed."""
     own = not wish.material
     return PartChoices(
         material=wish.material,

@@ -15,19 +15,9 @@ PIECE = 64  # places at a time, so that the table of distances stays small
 
 
 def on_surface(part: ShownPart, places: np.ndarray) -> np.ndarray:
-    """Return the points of a part's surface that are nearest to places.
+    """Return the points (k, 3) of a part's surface that are nearest to places (k, 3) of the ball's centre, both in m.
 
-    Parameters
-    ----------
-    part : ShownPart
-        Part whose surface is meant.
-    places : (k, 3) array
-        Centres of the ball, m.
-
-    Returns
-    -------
-    (k, 3) array
-        On the plane of the triangle whose middle is nearest, m.
+    Each lies on the plane of the triangle whose middle is nearest.
     """
     corners = np.asarray(part.points, dtype=float)[np.asarray(part.triangles)]
     middle = corners.mean(axis=1)

@@ -30,16 +30,8 @@ DEEPEST = 48  # touches from which the range of the colours is taken
 class SurfaceDrawing:
     """A body with a touched surface, or one that is held at a patch.
 
-    Attributes
-    ----------
-    surface : Surface
-        At rest.
-    nodes : (p,) int
-        The field's node that each point of the surface stands for.
-    fields : tuple of FieldSurrogate
-        Those shown: all on the nodes of the first, which is the displacement where there is one.
-    infos : tuple of FieldInfo
-        Names, units and ranges of the fields.
+    `surface` is at rest; `nodes` (p,) int are the field's nodes that its points stand for. All `fields` shown are on
+    the nodes of the first, which is the displacement where there is one; `infos` are their names, units and ranges.
     """
 
     def __init__(self, body: Touchable) -> None:
@@ -94,14 +86,7 @@ class SurfaceDrawing:
     def frame(self, state: State, held: bool, parameters: np.ndarray) -> dict[str, Any]:
         """Return the touch's part of a frame: the fields of `Frame` from `contact` to `indentation`.
 
-        Parameters
-        ----------
-        state : State
-            The tick that is drawn.
-        held : bool
-            Whether a hand holds or presses the body.
-        parameters : (p,)
-            The inputs that the hand doesn't supply.
+        `held` says whether a hand holds or presses the body; `parameters` (p,) are the inputs that it doesn't supply.
         """
         touched = held and not state.let_go
         deviation = self._judge.trust(state.position, parameters) if touched else 0.0

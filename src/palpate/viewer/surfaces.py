@@ -13,9 +13,8 @@ from palpate.surrogates import FieldSurrogate
 __all__ = ["Split", "outer_triangles", "relief", "split", "touchable_triangles"]
 
 CREASE = math.cos(math.radians(40.0))
-FACES = np.array(
-    [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
-)  # of a right-handed tetrahedron, seen from outside
+# faces of a right-handed tetrahedron, counter-clockwise as seen from outside
+FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 ALONG = 48  # cells of a relief along either side
 STEPS = 30  # of Newton's method down to the surface
@@ -25,37 +24,18 @@ NEAR = 0.1  # of the probe's radius: a triangle as near as this to the touched s
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """A surface whose points belong to one smooth patch each.
+    """A surface whose points belong to one smooth patch each."""
 
-    Attributes
-    ----------
-    nodes : (p,) int array
-        The body's node that each point stands for.
-    triangles : (t, 3) int array
-        Points.
-    creases : (s, 2) int array
-        Points at the ends of each sharp edge.
-    fixed : (s, 2) int array
-        Points at the ends of each edge around the fixed triangles.
-    """
-
-    nodes: np.ndarray
-    triangles: np.ndarray
-    creases: np.ndarray
-    fixed: np.ndarray
+    nodes: np.ndarray  # (p,) int, the body's node that each point stands for
+    triangles: np.ndarray  # (t, 3) int, points
+    creases: np.ndarray  # (s, 2) int, points at the ends of each sharp edge
+    fixed: np.ndarray  # (s, 2) int, points at the ends of each edge around the fixed triangles
 
 
 def split(rest: np.ndarray, triangles: np.ndarray, fixed: np.ndarray) -> Split:
-    """Split a surface along edges sharper than 40°.
+    """Split a surface along edges sharper than 40°; the border of the triangles `fixed` (t,) bool is found, too.
 
-    Parameters
-    ----------
-    rest : (node, 3) array
-        Positions at rest, m.
-    triangles : (t, 3) int array
-        Nodes, counter-clockwise as seen from outside.
-    fixed : (t,) bool array
-        Triangles whose border is wanted.
+    `rest` (node, 3) is in m; `triangles` (t, 3) are nodes, counter-clockwise as seen from outside.
     """
     first, second = _pairs(triangles)  # corners at which a shared edge starts and ends, on both sides
     a, b, c = np.moveaxis(rest[triangles], 1, 0)

@@ -36,17 +36,7 @@ CONTROLS, CONTROLS_AT_ONCE = 20.0, 100.0  # pings and fragments of a websocket, 
 
 
 class Bucket:
-    """A rate: so many permits a second, and so many at once.
-
-    Parameters
-    ----------
-    rate : float
-        Permits per second in the long run.
-    burst : float
-        Permits at once after a quiet time.
-    clock : function
-        Time in s.
-    """
+    """A rate: permits per second in the long run, and a burst of them at once after a quiet time; clock in s."""
 
     def __init__(self, rate: float, burst: float, clock: Clock = time.monotonic) -> None:
         self._rate, self._burst, self._clock = rate, burst, clock
@@ -77,14 +67,8 @@ class Turns:
 
     One picture is made at a time, in the order in which pages asked, and between two of them the thread reads what has
     come: the hand's messages never wait for more than one picture. Together pictures take at most `SHARE` of the
-    thread, each page the same part of it.
-
-    Parameters
-    ----------
-    shortest : float
-        Time between two pictures for one page where there is no crowd, s.
-    clock : function
-        Time in s.
+    thread, each page the same part of it. Without a crowd, `shortest` is the time in s between two pictures for one
+    page.
     """
 
     def __init__(self, shortest: float, clock: Clock = time.perf_counter) -> None:
@@ -115,20 +99,11 @@ class Closable(Protocol):
 
 
 class Waiting:
-    """Connections that have not sent a whole request yet.
+    """Connections that have not sent a whole request yet, at most `most` of them, for `limit` seconds each.
 
-    A newcomer takes the place of the one that has waited longest, so that whoever asks at once is answered however
-    many others keep silent.
-
-    Parameters
-    ----------
-    most : int
-        Number of such connections.
-    limit : float
-        Time that each of them has, s.
-    later : function of seconds, function and connection, optional
-        Calls the function with the connection after so many seconds, and returns what has a method `cancel`; by default
-        the running event loop's.
+    A newcomer takes the place of the one that has waited longest, so that whoever asks at once is answered however many
+    others keep silent. `later` takes seconds, a function and a connection, and returns what has a method `cancel`; by
+    default it is the running event loop's.
     """
 
     def __init__(
@@ -160,15 +135,7 @@ class Waiting:
 
 
 class PatientHttp(H11Protocol):
-    """An HTTP connection that is `Waiting` whenever it has not sent a whole request.
-
-    Parameters
-    ----------
-    waiting : Waiting
-        Shared by the connections of one server.
-    **options
-        Of uvicorn's own protocol.
-    """
+    """An HTTP connection that is `Waiting`, shared by those of one server, while it has not sent a whole request."""
 
     def __init__(self, *, waiting: Waiting, **options: Any) -> None:
         super().__init__(**options)

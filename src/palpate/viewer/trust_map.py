@@ -22,20 +22,11 @@ TYPICAL = 95  # percentile of the deviations at which the colour scale ends
 
 
 def trust_map(drawing: SurfaceDrawing) -> TrustMap:
-    """Return the relative deviation of the force under a ball at each point of a drawn surface.
+    """Return the relative deviation of the force under a free ball at each point of a drawn surface.
 
-    The ball is half as deep as the deepest trained press; further inputs are in the middle of their ranges.
-
-    Parameters
-    ----------
-    drawing : SurfaceDrawing
-        A body that a free ball presses.
-
-    Returns
-    -------
-    TrustMap
-        `NOT_TOUCHED` where a hand may not touch, `NOT_TRAINED` outside the trained region. Without a posterior the
-        trained region alone is known: the deviation is 0 there.
+    The ball is half as deep as the deepest trained press; further inputs are in the middle of their ranges. The map has
+    `NOT_TOUCHED` where a hand may not touch, `NOT_TRAINED` outside the trained region. Without a posterior the trained
+    region alone is known: the deviation is 0 there.
     """
     body = drawing.body
     points = np.asarray(drawing.surface.rest, dtype=float).reshape(-1, 3)

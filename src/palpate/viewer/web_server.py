@@ -50,23 +50,9 @@ READ = 4096  # bytes that the system keeps of what a page sends and is not read 
 
 
 def listen(port: int, host: str = "127.0.0.1", *, strict: bool = False) -> socket.socket:
-    """Open a socket that listens on this machine only.
+    """Open a socket that listens on this machine only, at a host of `LOOPBACK`; port 0 takes any free one.
 
-    Parameters
-    ----------
-    port : int
-        The port wanted; 0 takes any free one.
-    host : str
-        One of `LOOPBACK`.
-    strict : bool
-        Whether a busy port is an error; otherwise the next free one of `TRIES` is taken.
-
-    Raises
-    ------
-    PortInUseError
-        If no port of those tried is free.
-    UsageError
-        If the host or port is not one that a server of this machine may have.
+    A busy port is an error if `strict`; otherwise the next free one of `TRIES` is taken.
     """
     if host not in LOOPBACK:
         raise UsageError(
@@ -117,15 +103,7 @@ BACKLOG = 32  # connections that are taken at once, between two looks at what pa
 
 
 def local_application(routes: Sequence[BaseRoute], **options: Any) -> Starlette:
-    """Return a web application of these routes and the built pages.
-
-    Parameters
-    ----------
-    routes : sequence of routes
-        They come before the files of the built pages.
-    **options
-        Of `Starlette`.
-    """
+    """Return a web application of these routes, which come before the files of the built pages."""
     files = Mount("/", StaticFiles(directory=STATIC, html=True))
     return Starlette(routes=[*routes, files], **options)
 
@@ -277,15 +255,8 @@ def wait_until_interrupted(
 ) -> None:
     """Start a server and keep it until Ctrl-C or SIGTERM; in a notebook, leave it running and return at once.
 
-    Parameters
-    ----------
-    server : LocalServer
-        Not started yet.
-    open_browser : bool
-        Whether to open the page in the user's browser.
-    on_ready : callable, optional
-        Called once with the running server; by default its address is written to stderr, because a script that waits
-        here must say where to look.
+    `on_ready` is called once with the running server; by default its address is written to stderr, because a script
+    that waits here must say where to look.
     """
     if in_notebook():
         server.start()

@@ -42,18 +42,10 @@ CODES: dict[str, tuple[str, int | None]] = {
 
 @dataclass(frozen=True)
 class Wire:
-    """Annotation of a binary message's field.
+    """Annotation of a binary message's field."""
 
-    Attributes
-    ----------
-    kind : str
-        A key of `CODES`.
-    about : str
-        Meaning and unit, in a line.
-    """
-
-    kind: str
-    about: str
+    kind: str  # a key of `CODES`
+    about: str  # meaning and unit, in a line
 
     @classmethod
     def fields(cls, message: type[Binary]) -> tuple[tuple[str, Wire], ...]:
@@ -109,13 +101,7 @@ class Binary:
 
     @classmethod
     def unpack(cls, data: bytes) -> Self:
-        """Read the message from bytes.
-
-        Raises
-        ------
-        UsageError
-            If the bytes are not one whole message of this class.
-        """
+        """Read the message from bytes that are one whole message of this class."""
         layout = Layout.of(cls)
         try:
             kind, *numbers = layout.packer.unpack_from(data)
@@ -159,13 +145,7 @@ class Json:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Read the message from JSON.
-
-        Raises
-        ------
-        UsageError
-            If the text is no message of this class.
-        """
+        """Read the message from JSON."""
         try:
             values = json.loads(text)
             kind = values.pop("kind")

@@ -55,52 +55,24 @@ class OutputError:
 
 @dataclass(frozen=True)
 class OutputErrors:
-    """Errors over N samples of m outputs that share a unit.
+    """Errors over N samples of m outputs that share a unit."""
 
-    Attributes
-    ----------
-    units : int
-        Units of the network.
-    full_scale : float
-        Largest magnitude of any output in the test set: for a beam the largest tip deflection, m.
-    rmse, max : float
-        Over all outputs, in their unit.
-    relative, relative_max : float
-        The same over full scale.
-    per_output : tuple of OutputError
-        Errors of each output.
-    outer_count : int
-        Samples with any input within 5 % of an end of its range.
-    outer, rest : float or None
-        RMSE there and elsewhere; None without samples.
-    outer_ratio : float or None
-        outer / rest.
-    worst : Worst
-        Where the largest error is.
-    """
-
-    units: int
-    full_scale: float
-    rmse: float
-    max: float
-    relative: float
-    relative_max: float
+    units: int  # units of the network
+    full_scale: float  # largest magnitude of any output in the test set; of a beam tip deflection, m
+    rmse: float  # over all outputs, in their unit
+    max: float  # over all outputs, in their unit
+    relative: float  # RMSE over full scale
+    relative_max: float  # max over full scale
     per_output: tuple[OutputError, ...]
-    outer_count: int
-    outer: float | None
-    rest: float | None
-    outer_ratio: float | None
-    worst: Worst
+    outer_count: int  # samples with any input within 5 % of an end of its range
+    outer: float | None  # RMSE there; None without samples
+    rest: float | None  # RMSE elsewhere; None without samples
+    outer_ratio: float | None  # outer / rest
+    worst: Worst  # where the largest error is
 
 
 def output_errors(network: Network, X: np.ndarray, truth: np.ndarray) -> OutputErrors:
-    """Return the errors of a network at X (N, n) against truth (N, m).
-
-    Raises
-    ------
-    UsageError
-        If every output is zero, so that there is no scale to judge by.
-    """
+    """Return the errors of a network at X (N, n) against truth (N, m), of which not every output may be zero."""
     full = float(np.abs(truth).max())
     if not full > 0:
         raise UsageError(
@@ -137,21 +109,11 @@ def _rms(error: np.ndarray) -> float | None:
 
 @dataclass(frozen=True)
 class NetworkErrors(Figure):
-    """Errors of the networks for the displacements of the nodes.
-
-    Attributes
-    ----------
-    refined : OutputErrors
-        Of the refined network.
-    filter : OutputErrors or None
-        Of the sequential filter's own network, if the model holds it.
-    regression : float or None
-        Largest ratio of the filter's held-out error to its best so far.
-    """
+    """Errors of the networks for the displacements of the nodes."""
 
     refined: OutputErrors
-    filter: OutputErrors | None
-    regression: float | None
+    filter: OutputErrors | None  # of the sequential filter's own network, if the model holds it
+    regression: float | None  # largest ratio of the filter's held-out error to its best so far
 
     def measured(self) -> Measured:
         """Return the values that are compared with limits."""
@@ -249,13 +211,7 @@ def worse_than_filter(networks: NetworkErrors) -> str | None:
 
 
 def node_truth(model: Surrogate, data: Dataset) -> np.ndarray:
-    """Return what the network of the nodes should answer for a dataset, (N, m) in m.
-
-    Raises
-    ------
-    UsageError
-        If the dataset does not fit the model, or is empty.
-    """
+    """Return what the network of the nodes should answer for a dataset, (N, m) in m."""
     quantities, columns = node_outputs(data)
     found, wanted = [q.name for q in quantities], [q.name for q in model.fields["nodes"].network.outputs]
     if found != wanted:
@@ -273,15 +229,7 @@ def predicted_field(model: Surrogate, X: np.ndarray) -> np.ndarray:
 
 
 def stiffness_errors(model: Surrogate, test: Dataset) -> StiffnessErrors | str:
-    """Return the errors of the stiffness, or the reason why none can be derived.
-
-    Parameters
-    ----------
-    model : Surrogate
-        Body that loads bend.
-    test : Dataset
-        Converged unseen solves.
-    """
+    """Return the errors of the stiffness on converged unseen solves, or the reason why none can be derived."""
     if len(test.ranges) > 1:
         return (
             "Stiffness is not judged: solves scattered over several loads have no curve to take a slope of."

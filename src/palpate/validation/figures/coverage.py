@@ -20,21 +20,11 @@ FEWEST = 20
 
 @dataclass(frozen=True)
 class Coverage(Figure):
-    """Share of the errors that the 90 % interval holds.
+    """Share of the errors that the 90 % interval holds."""
 
-    Attributes
-    ----------
-    count : int
-        Solves with a force.
-    share : float
-        Share of them with ‖ΔF‖ ≤ 1.645 deviations.
-    median_deviation : float
-        Median of the standard deviation, relative to the force.
-    """
-
-    count: int
-    share: float
-    median_deviation: float
+    count: int  # solves with a force
+    share: float  # of them with ‖ΔF‖ ≤ 1.645 deviations
+    median_deviation: float  # median of the standard deviation, relative to the force
 
     def measured(self) -> Measured:
         """Return the value that is compared with a limit."""

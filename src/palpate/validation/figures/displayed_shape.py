@@ -17,22 +17,12 @@ __all__ = ["ShapeErrors", "displayed_shape", "shape_errors"]
 
 @dataclass(frozen=True)
 class ShapeErrors(Figure):
-    """Distances of all nodes of the solves' surface, over all solves.
+    """Distances of all nodes of the solves' surface, over all solves."""
 
-    Attributes
-    ----------
-    mean, max : float
-        m.
-    largest : float
-        Largest displacement of the solves, m.
-    worst : Worst
-        Node and solve with the largest distance.
-    """
-
-    mean: float
-    max: float
-    largest: float
-    worst: Worst
+    mean: float  # m
+    max: float  # m
+    largest: float  # largest displacement of the solves, m
+    worst: Worst  # node and solve with the largest distance
 
     def measured(self) -> Measured:
         """Return the values that are compared with limits."""

@@ -28,47 +28,25 @@ __all__ = [
 
 @dataclass(frozen=True)
 class ForceErrors(Figure):
-    """Errors of the force on the hand.
+    """Errors of the force on the hand; a touch up to f₀ counts as light."""
 
-    Attributes
-    ----------
-    units : int
-        Units of the force network.
-    largest, light : float
-        Largest ‖F‖ in the test set, and f₀ below which a touch counts as light, N.
-    outside : int
-        Samples that the model called outside its trained range.
-    count, light_count : int
-        Samples above f₀ and up to it.
-    median, p95, max : float or None
-        ‖ΔF‖/‖F‖ above f₀.
-    median_jnd, p95_jnd, max_jnd : float or None
-        The same in just noticeable differences of a force.
-    light_p95 : float or None
-        ‖ΔF‖/f₀ up to f₀.
-    direction_p95 : float or None
-        Angle between the forces in degrees above f₀; None where the hand feels one direction only.
-    worst, light_worst, direction_worst : Worst or None
-        Solves with the largest error above f₀, up to it, and in direction.
-    """
-
-    units: int
-    largest: float
-    light: float
-    outside: int
-    count: int
-    light_count: int
-    median: float | None
+    units: int  # units of the force network
+    largest: float  # largest ‖F‖ in the test set, N
+    light: float  # f₀, N
+    outside: int  # samples that the model called outside its trained range
+    count: int  # samples above f₀
+    light_count: int  # samples up to f₀
+    median: float | None  # ‖ΔF‖/‖F‖ above f₀, as the next two
     p95: float | None
     max: float | None
-    median_jnd: float | None
+    median_jnd: float | None  # in just noticeable differences of a force, as the next two
     p95_jnd: float | None
     max_jnd: float | None
-    light_p95: float | None
-    direction_p95: float | None
-    worst: Worst | None
-    light_worst: Worst | None
-    direction_worst: Worst | None
+    light_p95: float | None  # ‖ΔF‖/f₀ up to f₀
+    direction_p95: float | None  # angle of the forces above f₀, degrees; None if all have one direction
+    worst: Worst | None  # solve with the largest error above f₀
+    light_worst: Worst | None  # solve with the largest error up to f₀
+    direction_worst: Worst | None  # solve with the largest error in direction
 
     def measured(self) -> Measured:
         """Return the values that are compared with limits."""
@@ -83,20 +61,9 @@ class ForceErrors(Figure):
 def force_errors(
     samples: ForceSamples, X: np.ndarray, ranges: Sequence[Range], *, units: int, turning: bool = True
 ) -> ForceErrors:
-    """Return the errors of forces.
+    """Return the errors of forces of solves at inputs X (N, n), by a network of so many units.
 
-    Parameters
-    ----------
-    samples : ForceSamples
-        Forces of the model and of finite elements.
-    X : (N, n)
-        Inputs of the solves.
-    ranges : n ranges
-        Names, bounds and units of the inputs.
-    units : int
-        Of the network.
-    turning : bool
-        Whether the force can point in more than one direction.
+    `turning` says whether the force can point in more than one direction.
     """
     heavy = samples.heavy
     relative, jnd = samples.relative[heavy], samples.jnd[heavy]

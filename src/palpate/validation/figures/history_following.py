@@ -25,78 +25,38 @@ UNLOADED = 1e-9  # of the largest force: what is less is round-off
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """One unseen history, followed by the body and by the same body without its memory.
+    """One unseen history, followed by the body and by the same body without its memory."""
 
-    Attributes
-    ----------
-    path : LoadHistory
-        What was solved.
-    force, stored, lost : (N,)
-        Of the body, N and J.
-    elastic : (N,)
-        Force of the body without its memory, N.
-    shape : (N, node)
-        Distance of the shown nodes from the solved ones, m.
-    residual : float or None
-        Where the body stays when it is let go at the end, m; None if the history doesn't end without load.
-    """
-
-    path: LoadHistory
-    force: np.ndarray
-    stored: np.ndarray
-    lost: np.ndarray
-    elastic: np.ndarray
-    shape: np.ndarray
-    residual: float | None
+    path: LoadHistory  # what was solved
+    force: np.ndarray  # (N,), of the body, N
+    stored: np.ndarray  # (N,), of the body, J
+    lost: np.ndarray  # (N,), of the body, J
+    elastic: np.ndarray  # (N,), force of the body without its memory, N
+    shape: np.ndarray  # (N, node), distance of the shown nodes from the solved ones, m
+    residual: float | None  # where it stays when let go at the end, m; None if it ends under load
 
 
 @dataclass(frozen=True, eq=False)
 class HistoryErrors(Figure):
-    """Errors of a body with memory along histories that it has never seen.
+    """Errors of a body with memory along histories that it has never seen."""
 
-    Attributes
-    ----------
-    off : (N,)
-        |ΔP| over the largest force, at each sample.
-    count : int
-        Histories.
-    largest_force : float
-        Of the test, N.
-    median, p95, max : float
-        |ΔP| over the largest force.
-    elastic_median, elastic_p95 : float
-        |ΔP| over the largest force of the body without its memory.
-    residual_median, residual_max, residual_largest : float or None
-        Error of where it stays after unloading, and the farthest it stays, m.
-    shape_mean, shape_max : float
-        Distance of the shown nodes from the solved ones, m.
-    lost : float
-        Energy that the histories lost, J, all together.
-    lost_error : float
-        Largest error of the lost energy at the end of a history, J.
-    gives : float
-        Share of the steps that break the second law.
-    where : str
-        The sample with the largest error, in words.
-    """
-
-    off: np.ndarray
-    count: int
-    largest_force: float
-    median: float
+    off: np.ndarray  # (N,), |ΔP| over the largest force, at each sample
+    count: int  # histories
+    largest_force: float  # of the test, N
+    median: float  # |ΔP| over the largest force, as the next two
     p95: float
     max: float
-    elastic_median: float
+    elastic_median: float  # the same of the body without its memory, as the next
     elastic_p95: float
-    residual_median: float | None
+    residual_median: float | None  # error of where it stays after unloading, m, as the next
     residual_max: float | None
-    residual_largest: float | None
-    shape_mean: float
-    shape_max: float
-    lost: float
-    lost_error: float
-    gives: float
-    where: str
+    residual_largest: float | None  # the farthest it stays, m
+    shape_mean: float  # distance of the shown nodes from the solved ones, m
+    shape_max: float  # m
+    lost: float  # energy that the histories lost, J, all together
+    lost_error: float  # largest error of the lost energy at the end of a history, J
+    gives: float  # share of the steps that break the second law
+    where: str  # the sample with the largest error, in words
 
     def measured(self) -> Measured:
         """Return the values that are compared with limits."""
@@ -132,13 +92,7 @@ class HistoryErrors(Figure):
 
 
 def history_following(subject: Subject) -> HistoryErrors | None:
-    """Return the errors along unseen histories, where the model has a memory.
-
-    Raises
-    ------
-    UsageError
-        If the histories are of another mesh, there are none, or none of them needs a force.
-    """
+    """Return the errors along unseen histories of the same mesh, where the model has a memory."""
     if subject.body is None or subject.histories is None:
         return None
     followed = follow_unseen(subject.body, subject.histories)
@@ -173,13 +127,7 @@ def history_following(subject: Subject) -> HistoryErrors | None:
 
 
 def follow_unseen(body: Surrogate, test: LoadHistories) -> list[Followed]:
-    """Return a body led along each history.
-
-    Raises
-    ------
-    UsageError
-        If the histories are of another mesh, or there are none.
-    """
+    """Return a body led along each history; they must be of its mesh."""
     if not test.paths:
         raise UsageError("There is no history to test with.", fix="Lead the body through some.")
     field = line_of(body)

@@ -41,26 +41,14 @@ TOLERANCE = 1e-13  # disagreement that an interval may keep, over the energy of 
 
 @dataclass(frozen=True)
 class LoopWork(Figure):
-    """Net work around random closed polygons, over the energy that the hand gives on the way.
+    """Net work around random closed polygons, over the energy that the hand gives on the way."""
 
-    Attributes
-    ----------
-    loops : int
-        Number of polygons.
-    median, p95, max : float
-        |∮F·dx| / ½∮|F·dx|.
-    energy : float
-        Median energy ½∮|F·dx| of a loop, J.
-    open : float
-        Largest share of that energy that the quadrature left open.
-    """
-
-    loops: int
-    median: float
+    loops: int  # number of polygons
+    median: float  # |∮F·dx| / ½∮|F·dx|, as the next two
     p95: float
     max: float
-    energy: float
-    open: float = 0.0
+    energy: float  # median energy ½∮|F·dx| of a loop, J
+    open: float = 0.0  # largest share of that energy that the quadrature left open
 
     def measured(self) -> Measured:
         """Return the value that is compared with a limit."""
@@ -101,22 +89,10 @@ def border_work(subject: Subject) -> LoopWork | str | None:
 def function_work(
     model: TouchFunction, test: TouchSolves, *, border: bool = False, loops: int = LOOPS, seed: int = 0
 ) -> LoopWork | str:
-    """Return the work around random triangles to pentagons of a function of place, by converged quadrature.
+    """Return the work around random triangles to pentagons of a function of place, or the reason why there is none.
 
-    Parameters
-    ----------
-    model : TouchFunction
-        Force as a function of place.
-    test : TouchSolves
-        Corners are where its solves are.
-    border : bool
-        Corners instead at random in a box 30 % beyond the ranges, some trained and some not.
-    loops, seed : int
-        Number of polygons, and the seed that decides them.
-
-    Returns
-    -------
-    LoopWork, or the reason why there is none
+    Quadrature is converged. Corners are where the test's solves are; with `border` they lie at random in a box 30 %
+    beyond the ranges, some trained and some not.
     """
     rng = np.random.default_rng(seed)
     drawn = (_across(model, test, rng) if border else _between(test, rng) for _ in range(50 * loops))
@@ -176,16 +152,10 @@ class Work:
 def work_of_polygons(
     force: Callable[[np.ndarray], np.ndarray], corners: list[np.ndarray], most: int = 40_000
 ) -> Work:
-    """Return the work around polygons.
+    """Return the work around polygons under a force, (M, n) inputs in m → (M, 3) N.
 
-    Parameters
-    ----------
-    force : callable (M, n) → (M, 3)
-        Force at M inputs, N.
-    corners : list of (c, n)
-        Inputs at the corners, m; the last leads back to the first. Inputs beyond the third must not change.
-    most : int
-        Intervals halved at a time, at most; the others are left open.
+    Each polygon's corners are inputs (c, n); the last leads back to the first, and inputs beyond the third must not
+    change. At most `most` intervals are halved at a time; the others are left open.
     """
     begin, end = np.concatenate(corners), np.concatenate([np.roll(c, -1, axis=0) for c in corners])
     loop = np.repeat(np.arange(len(corners)), [len(c) for c in corners])

@@ -24,29 +24,15 @@ SAME = 1e-9  # of a range: inputs of the same solve
 
 @dataclass(frozen=True)
 class MeshErrors(Figure):
-    """Relative errors of the force above f₀ against refined solves.
+    """Relative errors of the force above f₀ against refined solves."""
 
-    Attributes
-    ----------
-    count : int
-        Refined solves above f₀.
-    together_median, together_p95 : float
-        Of the model: its own error and the mesh's.
-    paired : int
-        How many of them were also solved on the ordinary mesh.
-    mesh_median, mesh_p95 : float or None
-        Of the ordinary mesh alone.
-    worst : Worst
-        Of both together.
-    """
-
-    count: int
-    together_median: float
+    count: int  # refined solves above f₀
+    together_median: float  # of the model: its own error and the mesh's, as the next
     together_p95: float
-    paired: int
-    mesh_median: float | None
+    paired: int  # how many of them were also solved on the ordinary mesh
+    mesh_median: float | None  # of the ordinary mesh alone, as the next
     mesh_p95: float | None
-    worst: Worst
+    worst: Worst  # of both together
 
     def measured(self) -> Measured:
         """Return the values that are compared with limits."""
@@ -82,21 +68,9 @@ def mesh_error(subject: Subject) -> MeshErrors | str | None:
 
 
 def mesh_errors(model: TouchFunction, test: TouchSolves, refined: TouchSolves, light: float) -> MeshErrors:
-    """Compare with refined solves.
+    """Compare with refined solves above the light force f₀, N.
 
-    Parameters
-    ----------
-    model : TouchFunction
-        Force as a function of place.
-    test, refined : TouchSolves
-        Of the ordinary and of the refined mesh; rows of both with the same inputs give the mesh's own error.
-    light : float
-        f₀, N.
-
-    Raises
-    ------
-    UsageError
-        If no refined solve is above f₀.
+    Rows of `test` (ordinary mesh) and `refined` with the same inputs give the mesh's own error.
     """
     felt = np.linalg.norm(refined.force, axis=1) > light
     if not felt.any():

@@ -32,29 +32,15 @@ SOLVED = "finite-element solves along the stroke, joined by a cubic spline"
 
 @dataclass(frozen=True)
 class Smoothness(Figure):
-    """Largest ‖Fᵢ₊₁ − 2 Fᵢ + Fᵢ₋₁‖ along each stroke over that of the reference.
+    """Largest ‖Fᵢ₊₁ − 2 Fᵢ + Fᵢ₋₁‖ along each stroke over that of the reference."""
 
-    Attributes
-    ----------
-    strokes : int
-        Number of strokes.
-    median, p95, max : float
-        Of the ratio over the strokes.
-    largest : float
-        Largest second difference of the model, N.
-    reference : str
-        The reference in words.
-    worst : Worst
-        Where the stroke with the largest ratio begins.
-    """
-
-    strokes: int
-    median: float
+    strokes: int  # number of strokes
+    median: float  # of the ratio over the strokes, as the next two
     p95: float
     max: float
-    largest: float
-    reference: str
-    worst: Worst
+    largest: float  # largest second difference of the model, N
+    reference: str  # in words
+    worst: Worst  # where the stroke with the largest ratio begins
 
     def measured(self) -> Measured:
         """Return the value that is compared with a limit."""
@@ -85,21 +71,8 @@ def smoothness(
 ) -> Smoothness | str:
     """Return the roughness along strokes, or the reason why it is not judged.
 
-    Parameters
-    ----------
-    model : TouchFunction
-        Force as a function of place.
-    test : TouchSolves
-        Random strokes are straight lines between two of its touches, without those that lift off on the way.
-    strokes : sequence of TouchSolves, optional
-        Solves along strokes, in order: the reference where given.
-    count, seed : int
-        Of the random strokes.
-
-    Raises
-    ------
-    UsageError
-        If a stroke given has fewer than eight solves.
+    `strokes` are solves along strokes, in order, at least eight each: the reference where given. The `count` random
+    strokes are straight lines between two touches of the test, without those that lift off on the way.
     """
     found = (
         [_roughness_of_stroke(model, stroke) for stroke in strokes]

@@ -40,16 +40,9 @@ class StiffnessErrors(Figure):
 def matrix_errors(
     truth: np.ndarray, answer: np.ndarray, X: np.ndarray, ranges: Sequence[Range]
 ) -> StiffnessErrors | str:
-    """Return the errors of ∂F/∂c in Frobenius' norm, or the reason why there are none.
+    """Return the errors of ∂F/∂c (N, 3, 3), N/m, in Frobenius' norm at inputs X (N, n), or the reason why none exist.
 
-    Parameters
-    ----------
-    truth, answer : (N, 3, 3)
-        ∂F/∂c, N/m; rows whose truth is zero (no contact) or unknown are left out.
-    X : (N, n)
-        Inputs of the solves.
-    ranges : n ranges
-        Names, bounds and units of the inputs.
+    Rows whose truth is zero (no contact) or unknown are left out.
     """
     size = np.linalg.norm(truth, axis=(1, 2))
     rows = np.isfinite(size) & (size > 0)
@@ -62,19 +55,10 @@ def matrix_errors(
 
 
 def curve_slope(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the slope dy/dx of a curve through scattered points.
+    """Return rows (M,) of scattered points x, y (N,) and the slope dy/dx of a curve through them there.
 
-    Parameters
-    ----------
-    x, y : (N,)
-        In any order; points closer than a thousandth of the range to the one before are left out, since their
-        differences would be made of round-off.
-
-    Returns
-    -------
-    rows (M,), slope (M,)
-        Indices of the points kept, and the slope there; None if every other point alone gives another answer,
-        so that the points are too few for the curve.
+    Points closer than a thousandth of the range to the one before are left out, since their differences would be made
+    of round-off. None if every other point alone gives another answer, so that the points are too few for the curve.
     """
     from scipy.interpolate import CubicSpline
 

@@ -20,29 +20,15 @@ __all__ = ["Case", "Part", "Parts", "WorstCases", "parts", "parts_of_test", "wor
 
 @dataclass(frozen=True)
 class Part:
-    """Errors of the force on some of the solves.
+    """Errors of the force on some of the solves."""
 
-    Attributes
-    ----------
-    name : str
-        The part in words.
-    count, felt : int
-        Solves, and how many of them above f₀.
-    median, p95 : float or None
-        ‖ΔF‖/‖F‖ above f₀.
-    light_p95 : float or None
-        ‖ΔF‖/f₀ up to f₀.
-    stiffness_p95 : float or None
-        ‖ΔK‖/‖K‖.
-    """
-
-    name: str
-    count: int
-    felt: int
-    median: float | None
+    name: str  # the part in words
+    count: int  # solves
+    felt: int  # solves above f₀
+    median: float | None  # ‖ΔF‖/‖F‖ above f₀, as the next
     p95: float | None
-    light_p95: float | None
-    stiffness_p95: float | None
+    light_p95: float | None  # ‖ΔF‖/f₀ up to f₀
+    stiffness_p95: float | None  # ‖ΔK‖/‖K‖
 
 
 @dataclass(frozen=True)
@@ -118,16 +104,7 @@ def parts(
 ) -> tuple[Part, ...]:
     """Return the errors in all solves, the shallow and the deep third, the edge of the ranges, and outside.
 
-    Parameters
-    ----------
-    model : TouchFunction
-        Force as a function of place.
-    test : TouchSolves
-        Unseen solves.
-    samples : ForceSamples
-        Forces of the model and of finite elements at each solve.
-    stiffness : (N,), optional
-        ‖ΔK‖/‖K‖, not-a-number where unknown.
+    `stiffness` (N,) is ‖ΔK‖/‖K‖ of each solve, not-a-number where unknown.
     """
     some = {"all": np.ones(len(test), dtype=bool)}
     if model.depth is not None:

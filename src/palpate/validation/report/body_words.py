@@ -21,10 +21,7 @@ _UNNAMED = ("", "linear elastic", "own material")  # names that stand where none
 def body_words(provenance: Mapping[str, Any]) -> str:
     """Return a body as the start of a sentence: what it is, of what, how long, of what section, with or without weight.
 
-    Parameters
-    ----------
-    provenance : mapping
-        Of a dataset; whatever it does not tell is left out.
+    Whatever the provenance does not tell is left out.
     """
     body = provenance.get("problem", {}).get("body", {})
     traits = [f"A {str(body.get('type', 'body')).lower()}{_material(body.get('material'))}"]
@@ -38,13 +35,7 @@ def body_words(provenance: Mapping[str, Any]) -> str:
 
 
 def solid_words(data: Any) -> str:
-    """Return a solid body in one sentence: shape, size, mesh, materials, supports, and what acts on it.
-
-    Parameters
-    ----------
-    data : Dataset
-        Solves of it; empty where they do not tell.
-    """
+    """Return a solid body in one sentence: shape, size, mesh, materials, supports, what acts on it; may be empty."""
     if not isinstance(data, Dataset):
         return ""
     problem = data.provenance.get("problem", {})

@@ -23,20 +23,7 @@ TEMPLATE = Path(__file__).parent / "templates" / "growth.html"
 
 
 def growth_html(growth: GrowthRecorder, name: str) -> str:
-    """Return the page as text.
-
-    Parameters
-    ----------
-    growth : GrowthRecorder
-        Frames of a run that is done.
-    name : str
-        Name of the body, for the heading.
-
-    Raises
-    ------
-    UsageError
-        If nothing was recorded.
-    """
+    """Return the page of a recorded run as text, under the body's name."""
     if not growth.frames:
         raise UsageError(
             "There is no growth to be shown.",

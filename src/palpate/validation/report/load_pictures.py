@@ -97,15 +97,7 @@ def _signs(chapter: Chapter) -> str:
 
 
 def plot_shapes(model: Surrogate, data: Dataset) -> Figure:
-    """Draw the shapes of every solve in `data`, finite elements on the left and the field network on the right.
-
-    Parameters
-    ----------
-    model : Surrogate
-        Body that loads bend.
-    data : Dataset
-        Converged solves.
-    """
+    """Draw the shapes of every converged solve, finite elements on the left and the field network on the right."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 

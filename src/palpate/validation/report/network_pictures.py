@@ -148,17 +148,7 @@ def units_of(model: Surrogate, key: str) -> str:
 
 
 def node_errors(model: Surrogate, data: Dataset, label: str) -> tuple[list[str], np.ndarray]:
-    """Return the names of the nodes, and the length of each one's error (N, nodes) in m.
-
-    Parameters
-    ----------
-    model : Surrogate
-        Body that loads bend.
-    data : Dataset
-        Converged solves.
-    label : "refined" or "filter"
-        The refined network, or that of the sequential filter.
-    """
+    """Return the nodes' names and the lengths of their errors (N, nodes) in m; `label` is "refined" or "filter"."""
     network = model.fields[NETWORKS[label]].network
     error = network.predict(data.X) - node_truth(model, data)
     places = [q.name.partition(" at ")[2] or q.name for q in network.outputs]
@@ -170,14 +160,7 @@ def node_errors(model: Surrogate, data: Dataset, label: str) -> tuple[list[str],
 def plot_node_errors(model: Surrogate, data: Dataset, limit: float | None = None) -> Figure:
     """Draw one column of panels per network, one row per input; error on a logarithmic axis.
 
-    Parameters
-    ----------
-    model : Surrogate
-        Body that loads bend.
-    data : Dataset
-        Converged solves that the networks have never seen.
-    limit : float, optional
-        RMSE asked of the refined network in m, drawn across its panels.
+    The solves are converged and unseen. `limit` is the RMSE in m asked of the refined network, drawn across its panels.
     """
     labels = [k for k in TITLES if NETWORKS[k] in model.fields]
     rows = len(data.ranges)
@@ -279,12 +262,7 @@ def with_unit(quantity: Any) -> str:
 def plot_history(history: History, rivals: Mapping[str, History] | None = None) -> Figure:
     """Draw units on the left, held-out error on the right (the error before each update where nothing was held out).
 
-    Parameters
-    ----------
-    history : History
-        Record of the sequential filter.
-    rivals : mapping of str to History, optional
-        Other runs to draw in other colours and dashes.
+    Rivals are other runs, in other colours and dashes.
     """
     runs = {OWN: history, **(rivals or {})}
     fig, axes = figure(1, 2, size=(9.4, 3.1))

@@ -52,16 +52,9 @@ def _inputs(train: Any, columns: int) -> np.ndarray:
 def plot_places(
     energy: LearntEnergy, learnt: np.ndarray, unseen: np.ndarray, field: FieldSurrogate | None = None
 ) -> Figure:
-    """Draw the places of solves on the surface as it is seen from where they come.
+    """Draw the places of learnt (N, n) and unseen (M, n) solves on the touched surface, seen from where they come.
 
-    Parameters
-    ----------
-    energy : LearntEnergy
-        Energy with a touched surface.
-    learnt, unseen : (N, n), (M, n)
-        Inputs of the solves that were learnt from, and of those that were not.
-    field : FieldSurrogate, optional
-        Has the body's surface, whose outline is drawn.
+    The field has the body's surface, whose outline is drawn.
     """
     from matplotlib.collections import LineCollection
 
@@ -92,14 +85,7 @@ def plot_places(
 def silhouette(points: np.ndarray, triangles: np.ndarray, out: np.ndarray) -> np.ndarray:
     """Return the edges (s, 2) of a closed surface between triangles that face a viewer and triangles that don't.
 
-    Parameters
-    ----------
-    points : (n, 3)
-        Corners, m.
-    triangles : (t, 3)
-        Corners of each triangle, counter-clockwise as seen from outside.
-    out : (3,)
-        Direction towards the viewer.
+    `points` (n, 3) are in m, `triangles` (t, 3) counter-clockwise from outside, `out` (3,) points towards the viewer.
     """
     a, b, c = np.moveaxis(np.asarray(points)[triangles], 1, 0)
     faces = np.cross(b - a, c - a) @ out > 0.0

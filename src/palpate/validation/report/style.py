@@ -159,17 +159,7 @@ class Picture:
 
 
 def inline_svg(figure: Figure, key: str, alt: str) -> str:
-    """Return the figure as an ``<svg>`` element for a page that holds many.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure of Matplotlib.
-    key : str
-        Prefix of every id; letters, digits and hyphens.
-    alt : str
-        Text in its place for who cannot see it.
-    """
+    """Return the figure as an ``<svg>`` element; `key`, of letters, digits and hyphens, is the prefix of every id."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", dpi=140, metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()

@@ -27,19 +27,7 @@ class Fact:
 
 @dataclass(frozen=True)
 class Story:
-    """One body in plain words.
-
-    Attributes
-    ----------
-    verdict : str
-        The result in a few words.
-    passed : bool
-        True if every limit is kept.
-    facts : tuple of Fact
-        Figures that stand for many.
-    solved, learnt, good : str
-        A paragraph each.
-    """
+    """One body in plain words: a verdict, figures that stand for many, and a paragraph on each of three subjects."""
 
     verdict: str
     passed: bool

@@ -173,20 +173,9 @@ def contact_points(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
 def at_depth(
     energy: LearntEnergy, view: View, places: np.ndarray, like: np.ndarray, depth: float
 ) -> np.ndarray:
-    """Return inputs (N, n) that have the probe `depth` deep where it is seen at places (N, 2); not-a-number where none.
+    """Return inputs (N, n) with the probe `depth` m deep where places (N, 2), m, are seen; not-a-number where none.
 
-    Parameters
-    ----------
-    energy : LearntEnergy
-        Energy with a touched surface.
-    view : View
-        Directions in which the surface is seen.
-    places : (N, 2)
-        m.
-    like : (n,)
-        An input near the surface; the further inputs are its.
-    depth : float
-        m.
+    `like` (n,) is an input near the surface; the further inputs are its.
     """
     X = np.repeat(like[None], len(places), axis=0)
     X[:, :3] = (
@@ -203,19 +192,11 @@ def at_depth(
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One line into the body.
+    """One line into the body, of the surrogate."""
 
-    Attributes
-    ----------
-    depth, force : (M,)
-        Of the surrogate, m and N.
-    rows : (k,)
-        Solves on the line, the deepest first.
-    """
-
-    depth: np.ndarray
-    force: np.ndarray
-    rows: np.ndarray
+    depth: np.ndarray  # (M,), m
+    force: np.ndarray  # (M,), N
+    rows: np.ndarray  # (k,), solves on the line, the deepest first
 
 
 def curves(energy: LearntEnergy, test: TouchSolves, most: int = LINES) -> list[Curve]:

@@ -31,15 +31,7 @@ Solved = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def plot_trace(trace: Trace, solved: Solved | None = None) -> Figure:
-    """Draw force and depth in time, and the force by depth, with the finite elements beside it where there are some.
-
-    Parameters
-    ----------
-    trace : Trace
-        With at least one tick.
-    solved : Solved, optional
-        Solves beside the stroke.
-    """
+    """Draw force and depth in time, and the force by depth, with the finite elements beside it where there are some."""
     fig, axes = figure(1, 2, size=(9.2, 3.6), width_ratios=(1.7, 1.0))
     time, size = trace.time, np.linalg.norm(trace.ticks["force"], axis=1)
     depth = 1e3 * np.maximum(trace.ticks["depth"].astype(float), 0.0)
@@ -136,15 +128,7 @@ def _drawing(comparison: TouchComparison) -> Callable[[], Figure]:
 
 
 def save_figure(path: str | os.PathLike[str], draw: Callable[[], Figure]) -> Path:
-    """Write a drawing as a file of its own, on white; the ending says in which format, such as ``.svg`` or ``.png``.
-
-    Raises
-    ------
-    UsageError
-        If Matplotlib knows no such format.
-    ResourceError
-        If the disk is full or write-protected.
-    """
+    """Write a drawing as a file of its own, on white; the ending says in which format, such as ``.svg`` or ``.png``."""
     target = Path(path)
     with styled(target.stem), writing(target) as part:
         try:

@@ -87,13 +87,7 @@ def render(
     title: str = TITLE,
     machine: Mapping[str, Any] | None = None,
 ) -> str:
-    """Return the page as text; the same chapters give the same text.
-
-    Raises
-    ------
-    UsageError
-        If there is no chapter.
-    """
+    """Return the page of at least one chapter as text; the same chapters give the same text."""
     if not chapters:
         raise UsageError("A report needs at least one chapter.", fix="Validate a model first.")
     from jinja2 import Environment, PackageLoader, StrictUndefined

@@ -41,7 +41,9 @@ class Samples:
     columns : tuple of str
         Names of the table's columns that are the inputs, in their order; of a bare array those of the inputs.
     lines : tuple of int, optional
-        Line of the table of each sample, by which notes name it; None where they count the rows from 0.
+        Line of each row of the table, by which notes name a sample; None where they count the rows from 0.
+    rows : tuple of int, optional
+        Row of the table of each sample, where some rows are left out.
     """
 
     X: np.ndarray
@@ -51,6 +53,7 @@ class Samples:
     one_output: bool
     columns: tuple[str, ...]
     lines: tuple[int, ...] | None = None
+    rows: tuple[int, ...] | None = None
 
     @classmethod
     def of(

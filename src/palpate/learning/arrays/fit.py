@@ -24,6 +24,7 @@ import numpy as np
 from palpate.errors import FitWarning
 from palpate.learning.arrays.array_samples import ArrayProblem, Samples, check_search
 from palpate.learning.arrays.calibration import Finish
+from palpate.learning.arrays.close_copies import better_with_copies, problem_without_copies
 from palpate.learning.arrays.few_rows import best_of_few, few_places
 from palpate.learning.arrays.fit_notes import IDLE
 from palpate.learning.arrays.fitted import Fitted
@@ -37,7 +38,7 @@ from palpate.learning.arrays.members import (
     Fresh,
     refit_weights,
 )
-from palpate.learning.folds import fold_masks, near_places
+from palpate.learning.folds import fold_masks
 from palpate.learning.kernel_layer import CENTRES_MAX, STARTS, KernelLayer, Metric, likely_metric
 from palpate.learning.pool import Pool
 from palpate.learning.search import Budget, Candidate, Trial, Work, evaluate_all
@@ -122,13 +123,13 @@ def fit(
     Notes
     -----
     Of fewer than 100 places each is left out once (`palpate.learning.arrays.few_rows`). Of more samples a fifth (15 %
-    of a thousand and more) is held out to choose by. Then ten networks, or five, are
-    learnt each without a fifth of the samples, and their mean is handed over: error and intervals are those of the
-    networks that had not seen a sample (see `palpate.learning.arrays.calibration`).
+    of a thousand and more) is held out to choose by. Then ten networks, or five, learn each without a fifth of them,
+    and their mean is handed over: error and intervals are those of the networks that had not seen a sample (see
+    `calibration`, beside it). Close copies that tell no noise are left out of the search (`close_copies`).
 
-    Of more than 10,000 samples 5,000 decide the kind of network; its units and weights learn from all of them, but for
-    4,000 by which more units and steps are decided and 4,000 that measure the error and set the intervals. In the end
-    the weights learn from every sample (see `palpate.learning.arrays.many_rows`).
+    Of more than 10,000 samples 5,000 decide the kind of network; units and weights learn from all, but for 4,000 that
+    decide more units and steps and 4,000 that measure the error and set the intervals. In the end the weights learn
+    from every sample (see `palpate.learning.arrays.many_rows`).
 
     Raises
     ------
@@ -142,18 +143,17 @@ def fit(
     budget = Budget.of(effort, seconds)
     check_search(seed, target, level)
     samples = Samples.of(X, Y, inputs, outputs, lines)
-    if seconds is not None:
-        # fitting to all samples and freezing come after the search
+    if seconds is not None:  # fitting to all samples and freezing come after the search
         budget = Budget(min(budget.effort, seconds / _SECONDS), began + 0.85 * seconds)
     with threadpool_limits(1):  # small matrices: threads would cost more than they bring
-        problem = ArrayProblem.of(samples.X, samples.Y, samples.inputs, samples.outputs)
-        places = near_places(problem.X)
-        options = samples, problem, places, began, budget, Pool(workers), seed, target, level
+        some, problem, places = problem_without_copies(samples)
+        options = some, problem, places, began, budget, Pool(workers), seed, target, level
         if len(places) > MANY_ROWS:
             fitted = _Chooser(*options, RowParts.of(places, seed)).chosen_for_many(workers)
         else:
             chooser = _Chooser(*options)
             fitted = chooser.chosen_of_few() if few_places(places) else chooser.chosen()
+            fitted = better_with_copies(fitted, samples, some, seed, level)
     fitted = replace(fitted, columns=samples.columns)
     for note in fitted.notes:
         if not note.startswith(IDLE):

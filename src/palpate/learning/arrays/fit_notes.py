@@ -55,9 +55,10 @@ def notes_on(
             f"The network predicts no better than the outputs' mean: its held-out error is {share(fitted.heldout)} of "
             "their spread. The inputs may not decide the outputs, or too few samples show how."
         )
-    wild = np.sort(rows[wild_rows(missed)]).tolist()
+    own = np.arange(len(samples.X)) if samples.rows is None else np.array(samples.rows)
+    wild = np.sort(own[rows[wild_rows(missed)]]).tolist()
     if wild:
-        notes.append(wild_note(wild, len(samples.X), samples.lines))
+        notes.append(wild_note(wild, problem.record["training"]["samples"], samples.lines))
     notes += _passed_over(samples, problem)
     if len(scales) > 1 and fitted.units and scales.max() > 0:
         idle = [r.name for r, s in zip(samples.inputs, scales, strict=True) if s < _IRRELEVANT * scales.max()]

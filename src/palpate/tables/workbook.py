@@ -15,19 +15,7 @@ __all__ = ["workbook_rows"]
 def workbook_rows(path: Path, sheet: str | None) -> tuple[list[Row], list[str]]:
     """Return the rows of a sheet that are not empty, and notes on what was left out.
 
-    Parameters
-    ----------
-    path : Path
-        The workbook. Of a formula the value counts that was last computed.
-    sheet : str, optional
-        Name of the sheet; needed where several hold something.
-
-    Raises
-    ------
-    FileFormatError
-        If the workbook can't be read, or it is not clear which sheet is meant.
-    UsageError
-        If openpyxl is missing.
+    Of a formula the value counts that was last computed. `sheet` is needed where several hold something.
     """
     try:
         import openpyxl

@@ -49,21 +49,9 @@ def split_cells(
     subdivide pyramids, prisms and hexahedra into tetrahedra, 8th Int. Meshing Roundtable). A cell with a face that
     lies on tetrahedra of the file, which cut it the other way, gets a node in its middle.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Nodes.
-    solids : list of (str, (k, corners) int array)
-        Cells by kind.
-
-    Returns
-    -------
-    points : (m, 3) array
-        Nodes, with those in the middle of cells behind them.
-    tetrahedra : (e, 4) int array
-        Right-handed where the cells of their kind are all numbered alike.
-    origin : (e,) int array
-        Index of the cell of each, counted through the blocks.
+    `points` are the nodes (n, 3), `solids` the cells (k, corners) by kind. Returns the nodes (m, 3), with those in
+    the middle of cells behind them; tetrahedra (e, 4), right-handed where the cells of their kind are all numbered
+    alike; and the index (e,) of the cell of each, counted through the blocks.
     """
     cut = _cut_by_tetrahedra(solids)
     tetrahedra, origins, middles = [], [], []

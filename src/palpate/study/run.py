@@ -288,16 +288,8 @@ def with_validation(
 ) -> Any:
     """Return what was learnt with its errors on unseen solves written into it.
 
-    Parameters
-    ----------
-    model : Surrogate
-        What was learnt.
-    validation : Validation
-        Its figures.
-    curve : sequence of mapping
-        Learning curve of the surrogate that it replaces, if there was one.
-    solves : int
-        Solves that it was learnt from; 0 where the curve is not kept.
+    `curve` is the learning curve of the surrogate that it replaces; `solves` is the number that it was learnt from,
+    0 where the curve is not kept.
     """
     more: dict[str, Any] = {"validation": validation.summary()}
     if solves:

@@ -27,12 +27,8 @@ SIDES = {
 def merge_nodes(points: np.ndarray, shortest: float) -> tuple[np.ndarray, float]:
     """Return for each node the number of the one that stands for its place, and how far apart they are at most, m.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Nodes in m.
-    shortest : float
-        Shortest edge of the mesh in m; nodes that are a tenth of it apart are two.
+    `points` are (n, 3) in m; nodes that are a tenth of `shortest`, the shortest edge of the mesh in m, apart are
+    two.
     """
     length = float(np.ptp(points, axis=0).max())
     node = unite_points(points, min(SAME * length, SHORT * shortest))

@@ -53,33 +53,10 @@ def improve_study(
     ``NAME-SOLVES.palpate``, and the newest as ``NAME.palpate``; a step tells its file as `model_path`. All solves that
     ``[test]`` asks for have judged the surrogate by the time its error counts as reached.
 
-    Parameters
-    ----------
-    study : Study
-        A study of a solid body under a probe.
-    paths : Paths
-        Where the files are.
-    until : float
-        Wanted relative force error at the 95th percentile of unseen solves.
-    limit : float
-        Time in s after which no further batch begins; by default none.
-    most : int
-        Solves to learn from after which no further batch begins.
-    cluster : optional
-        A running `local_cluster`, or what else `palpate.sweep` takes.
-    interest : callable, optional
-        From inputs (C, n) of places to how much an error there counts, (C,), such as where a hand goes.
-    progress : bool or callable
-        Of each batch: a bar on standard error, or a function (done, total).
-    case_limit : float
-        Time in s after which a single solve has failed.
-    log : callable
-        Gets one line when a part of the work begins.
-
-    Raises
-    ------
-    UsageError
-        If the study's body is not pressed by a probe, or its files are of another body.
+    `until` is the wanted relative force error at the 95th percentile of unseen solves; no further batch begins
+    after `limit` s or `most` solves; a single solve has failed after `case_limit` s. `interest` takes inputs (C, n)
+    of places and returns how much an error there counts, (C,), such as where a hand goes. `progress` is of each
+    batch.
     """
     if not isinstance(study.sweep, ProbeSweepRecord) or study.test is None:
         raise UsageError(

@@ -78,18 +78,8 @@ def shown_part(study: Study) -> ShownPart:
 def chosen_study(study: Study, choices: PartChoices) -> Study:
     """Return the study of a part with the choices of a person in place of its own.
 
-    Parameters
-    ----------
-    study : Study
-        The study that `shown_part` has shown.
-    choices : PartChoices
-        Choices of the page.
-
-    Raises
-    ------
-    UsageError
-        If they don't fit: nothing is held or touched, the ball or its depth is too large, elements are larger than
-        the ball, or the material can't be.
+    `study` is what `shown_part` has shown. A misfit is refused: nothing is held or touched, the ball or its depth
+    is too large, elements are larger than the ball, or the material can't be.
     """
     body, acting = _parts(study)
     skin = body.bare().skin

@@ -59,25 +59,8 @@ def part_study(
     The part is held at its flat face below, or where it has none at the lowest eighth of its height; it is pressed
     where it faces up. Probe and depth follow from its least extent, the material is neo-Hookean.
 
-    Parameters
-    ----------
-    file : path
-        A surface, solids or a volume mesh.
-    unit : str, optional
-        Unit of the file's numbers. By default mm, or m where mm can't be; between 1 and 5 in numbers it has to be said.
-    young, poisson : float
-        Young's modulus in Pa, and Poisson's ratio.
-    radius, depth : float, optional
-        Radius of the ball and its largest depth, m; by default from the part's least extent.
-    held : sequence of str
-        Surfaces of the file that are held; by default what the part stands on.
-    touched : str, optional
-        Surface of the file that is pressed; by default all that faces up.
-
-    Raises
-    ------
-    UsageError, FileFormatError
-        If the file is missing, or no body, a choice does not suit it, or its unit has to be said.
+    By default `unit` is mm, or m where mm can't be; between 1 and 5 in numbers it has to be said. `young` is in Pa;
+    the ball's `radius` and largest `depth` are in m. `held` and `touched` name surfaces of the file.
     """
     path = Path(file)
     if not part_kind(path):

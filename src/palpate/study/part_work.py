@@ -75,22 +75,9 @@ def work_on(
 ) -> None:
     """Improve a study until a force error is kept, and say all that a page shows of it.
 
-    Parameters
-    ----------
-    study : Study
-        A study of a part under a ball.
-    paths : Paths
-        Where its files are; a later call goes on from them.
-    say : callable
-        Takes what the module's text lists.
-    until : float
-        Wanted relative force error at the 95th percentile of unseen solves.
-    limit : float
-        Time in s after which no further batch of solves begins.
-    workers : int, optional
-        Processes that solve; by default one for each core, one fewer once there is something to touch.
-    stopped : callable
-        Returns whether no further batch shall begin.
+    `say` takes what the module's text lists. `until` is the wanted relative force error at the 95th percentile of
+    unseen solves; after `limit` s, or once `stopped` returns true, no further batch of solves begins. `workers` is
+    by default one for each core, one fewer once there is something to touch.
     """
     from palpate.study.improve_study import improve_study
     from palpate.sweeps import local_cluster

@@ -58,21 +58,8 @@ def with_relaxation(
 ) -> Surrogate:
     """Return a surrogate of a relaxing material with its memory; any other one as it is.
 
-    Parameters
-    ----------
-    study : Study
-        The study that it was learnt from.
-    surrogate : Surrogate
-        The instantaneous answer.
-    log : callable
-        Gets a line when the held presses begin, and one on what they tell.
-
-    Raises
-    ------
-    SolverError
-        If a held press can't be solved.
-    UsageError
-        If the presses don't tell the relaxation.
+    `surrogate` is the instantaneous answer. SolverError if a held press can't be solved, UsageError if the presses
+    don't tell the relaxation.
     """
     times = prony_times(study)
     if not times:
@@ -160,23 +147,8 @@ def held_press(
 ) -> tuple[list[float], list[float], float]:
     """Return times after a sudden press in s, forces along the way out in N, and the energy at once in J.
 
-    Parameters
-    ----------
-    problem : SolidProblem
-        A body with a history under one ball.
-    touch : (3,)
-        Centre of the ball at first contact, m.
-    inward : (3,)
-        Direction of the press, a unit vector.
-    depth : float
-        Depth that is held, m.
-    looks : sequence of float
-        Times after the press at which the force is solved, s.
-
-    Raises
-    ------
-    SolverError
-        If a step does not converge.
+    `touch` (3,) is the centre of the ball at first contact in m, `inward` (3,) the unit vector of the press,
+    `depth` the depth that is held in m, `looks` the times after the press at which the force is solved, in s.
     """
     drive = step_hold(touch, depth, np.asarray(looks), inward=inward)
     solver = problem.open()

@@ -119,32 +119,9 @@ def sweep_study(
 ) -> tuple[Rows, Rows | None]:
     """Solve the study's design, and what is solved for testing only.
 
-    Parameters
-    ----------
-    study : Study
-        The study to solve.
-    paths : Paths, optional
-        Where datasets are written as they grow; an interrupted sweep goes on where it stopped.
-    cluster : optional
-        A running `local_cluster`, to share between studies; by default processes of its own serve both sweeps.
-    progress : bool or callable
-        A bar on standard error; or a function (done, total).
-    case_limit : float
-        Time in s after which a single solve has failed.
-    log : callable
-        Gets a line before each of the two sweeps.
-
-    Returns
-    -------
-    data, further : Dataset or load histories
-        `further` is None where nothing more is solved for testing.
-
-    Raises
-    ------
-    SolverError
-        If more than half of the solves fail.
-    UsageError
-        If another study's dataset is in the way.
+    Datasets are written to `paths` as they grow, and an interrupted sweep goes on where it stopped. A solve has
+    failed after `case_limit` s; SolverError if more than half fail. The second result is None where nothing more is
+    solved for testing. Without `cluster`, processes of its own serve both sweeps.
     """
     problem = study.problem()
     if study.sweep is None or study.test is None:
@@ -263,30 +240,9 @@ def learn_study(
 ) -> tuple[Any, Any]:
     """Learn the study's surrogate, which keeps the study's runtime settings.
 
-    Parameters
-    ----------
-    study : Study
-        The study whose settings are used.
-    train : Dataset or load histories
-        Solves to learn from.
-    test : Dataset or load histories, optional
-        Unseen rows, which are only watched while a filter learns.
-    progress : callable, optional
-        A function (done, total) of the filter's observations.
-    log : callable
-        Gets one line when a part of the work begins.
-    watch : GrowthRecorder, optional
-        Keeps frames of the growth of the study's sequential filter.
-
-    Returns
-    -------
-    surrogate, history
-        What `palpate.learn` returns, and for a body with memory how well it fits.
-
-    Raises
-    ------
-    UsageError
-        If the growth is to be watched of a study that has no sequential filter.
+    Rows of `test` are only watched while a filter learns; `progress` counts its observations, and `watch` (a
+    GrowthRecorder) keeps frames of a sequential filter's growth. Returns what `palpate.learn` returns, and for a
+    body with memory how well it fits.
     """
     if watch is not None and (study.filter is None or not isinstance(train, Dataset)):
         raise UsageError(
@@ -332,16 +288,8 @@ def with_validation(
 ) -> Any:
     """Return what was learnt with its errors on unseen solves written into it.
 
-    Parameters
-    ----------
-    model : Surrogate
-        What was learnt.
-    validation : Validation
-        Its figures.
-    curve : sequence of mapping
-        Learning curve of the surrogate that it replaces, if there was one.
-    solves : int
-        Solves that it was learnt from; 0 where the curve is not kept.
+    `curve` is the learning curve of the surrogate that it replaces; `solves` is the number that it was learnt from,
+    0 where the curve is not kept.
     """
     more: dict[str, Any] = {"validation": validation.summary()}
     if solves:
@@ -405,22 +353,8 @@ def carry_out(
 ) -> Outcome:
     """Carry out a study up to its validation and write its datasets, model and history.
 
-    Parameters
-    ----------
-    study : Study
-        The study to carry out.
-    paths : Paths
-        Where files are written.
-    cluster : optional
-        A running `local_cluster`, to share between studies.
-    progress : bool or callable
-        Of the sweep: a bar on standard error, or a function (done, total).
-    log : callable
-        Gets one line when a stage begins.
-    rivals : bool
-        Whether to run the founding form of the filter beside ours, where there is a filter.
-    case_limit : float
-        Time in s after which a single solve of the sweep has failed.
+    A single solve of the sweep has failed after `case_limit` s; `rivals` says whether to run the founding form of
+    the filter beside ours, where there is a filter.
     """
     timings: dict[str, float] = {}
 

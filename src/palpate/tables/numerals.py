@@ -72,17 +72,8 @@ class Numerals:
     def of(cls, columns: Sequence[Sequence[Cell]], separator: str | None) -> Numerals:
         """Find the convention of a table.
 
-        Parameters
-        ----------
-        columns : sequence of columns
-            Cells of the columns that hold numbers.
-        separator : str, optional
-            Mark between cells; between commas a decimal comma would have to be quoted.
-
-        Raises
-        ------
-        UsageError
-            If cells contradict each other, or allow more than one reading; the message names lines and cells.
+        `columns` are those that hold numbers; where commas separate cells, a decimal comma would have to be quoted.
+        Cells that contradict each other or allow more than one reading are refused by line and cell.
         """
         evidence = _Evidence.of(columns)
         comma, dot = evidence.decimal[","], evidence.decimal["."]

@@ -101,17 +101,7 @@ def split_comments(text: str) -> tuple[list[tuple[int, str]], list[tuple[int, st
 def choose_separator(lines: Sequence[tuple[int, str]], stated: str | None) -> str | None:
     """Return the mark between cells: the stated one, else the one by which most cells are numbers; None for none.
 
-    Parameters
-    ----------
-    lines : sequence of (number, line)
-        Lines of the table without comments.
-    stated : str, optional
-        The mark, or a word for it such as "tab".
-
-    Raises
-    ------
-    UsageError
-        If the stated one is not one character.
+    `stated` is one character, or a word for it such as "tab"; `lines` has (number, line) without comments.
     """
     if stated is not None:
         mark = _NAMED.get(stated.lower(), stated)
@@ -263,23 +253,8 @@ def head_of(
 ) -> Head | None:
     """Return the head of a table; None where it has none.
 
-    Parameters
-    ----------
-    rows : sequence of Row
-        All rows of the table.
-    first : int
-        Index of the first row of data.
-    comments : sequence of (number, text)
-        Comments of the table without their marks.
-    separator : str, optional
-        Mark between cells.
-    line : int, optional
-        Number of the line that names the columns, where it was stated.
-
-    Raises
-    ------
-    UsageError
-        If the stated line is none of the head.
+    `first` is the index of the first row of data; comments come as (number, text) without their marks; `line` is
+    the number of the line that names the columns, where it was stated.
     """
     width = max((row.filled for row in rows[first : first + _SAMPLE]), default=0)
     above = list(rows[:first])

@@ -36,23 +36,9 @@ _NO_TEXT = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\ufffe\uffff]")
 def read_table_text(path: str | os.PathLike[str], encoding: str | None = None) -> tuple[str, str]:
     """Read a file as text.
 
-    Parameters
-    ----------
-    path : path
-        The file.
-    encoding : str, optional
-        Name of its encoding. By default that of its byte order mark; without one UTF-16 where every other byte is
-        zero, else UTF-8, else Windows-1252, which contains Latin-1.
-
-    Returns
-    -------
-    (str, str)
-        The text, its lines ended by a line feed, and a note where the encoding was not certain, else "".
-
-    Raises
-    ------
-    FileFormatError
-        If the file can't be read, is of another kind, or is not in this encoding.
+    By default the encoding is that of the byte order mark; without one UTF-16 where every other byte is zero, else
+    UTF-8, else Windows-1252, which contains Latin-1. Returns the text, its lines ended by a line feed, and a note
+    where the encoding was not certain, else "".
     """
     path = Path(path)
     content = read_input(path)

@@ -68,12 +68,7 @@ def plain_unit(cell: str) -> str:
 def is_unit(cell: str, *, among_words: bool = False) -> bool:
     """Return true of what is a unit: in brackets, a pure number's mark, or made of known symbols.
 
-    Parameters
-    ----------
-    cell : str
-        Text that may be a unit.
-    among_words : bool
-        True where a single letter may as well be a name.
+    With `among_words`, a single letter may as well be a name.
     """
     text = cell.strip()
     if _WRAPPED.fullmatch(text):
@@ -91,15 +86,7 @@ def is_unit(cell: str, *, among_words: bool = False) -> bool:
 def si_unit(unit: str) -> tuple[float, float, str]:
     """Return factor, offset and SI unit: a value v in `unit` is factor · v + offset in the SI unit.
 
-    Parameters
-    ----------
-    unit : str
-        A unit; "" and "1" are pure numbers.
-
-    Raises
-    ------
-    UsageError
-        If there is no such unit.
+    The units "" and "1" are pure numbers.
     """
     text = plain_unit(unit)
     if text in {"", "1"}:

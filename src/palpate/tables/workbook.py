@@ -29,19 +29,7 @@ _EMPTY_CELLS, _EMPTY_SHARE = (
 def workbook_rows(path: Path, sheet: str | None) -> tuple[list[Row], list[str]]:
     """Return the rows of a sheet that are not empty, and notes on what was left out.
 
-    Parameters
-    ----------
-    path : Path
-        The workbook. Of a formula the value counts that was last computed.
-    sheet : str, optional
-        Name of the sheet; needed where several hold something.
-
-    Raises
-    ------
-    FileFormatError
-        If the workbook can't be read, or it is not clear which sheet is meant.
-    UsageError
-        If openpyxl is missing.
+    Of a formula the value counts that was last computed. `sheet` is needed where several hold something.
     """
     if importlib.util.find_spec("openpyxl") is None:
         raise UsageError(

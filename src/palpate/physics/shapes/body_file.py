@@ -383,17 +383,8 @@ def _bounds(corner: Corner | None, missing: float) -> np.ndarray:
 def segments(surface: Trimesh, angle: float = FEATURE_ANGLE) -> np.ndarray:
     """Number the parts of a closed surface that sharp edges bound, the largest area first.
 
-    Parameters
-    ----------
-    surface : trimesh.Trimesh
-        A closed one: each edge belongs to two triangles.
-    angle : float
-        In degrees; an edge is sharp where the normals of its two triangles differ by more.
-
-    Returns
-    -------
-    (t,) int array
-        Number of each triangle's part.
+    The surface is closed: each edge belongs to two triangles, and is sharp where their normals differ by more than
+    `angle` degrees. Returns the number of each triangle's part, (t,).
     """
     from trimesh.graph import connected_component_labels
 
@@ -414,30 +405,9 @@ def apply_patches(
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Give the parts inside the patches their names; a later patch goes over an earlier one.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the parts.
-    index : (n,) int array
-        Index into `names` for each face.
-    centres : (n, 3) array
-        Centres of the faces, m.
-    patches : sequence of SurfacePatch
-        Names to give, and where.
-    normals : (n, 3) array, optional
-        Outward unit normals of the faces; without them no patch can be chosen by the way that it faces.
-
-    Returns
-    -------
-    names : tuple of str
-        Names that are left, the patches' first.
-    index : (n,) int array
-        Index into them for each face.
-
-    Raises
-    ------
-    UsageError
-        If a patch contains nothing.
+    `index` (n,) points into `names` for each face, with `centres` (n, 3) in m and outward unit `normals` (n, 3);
+    without normals no patch can be chosen by the way that it faces. Returns the names that are left, the patches'
+    first, and the index into them.
     """
     label = np.array([names[i] for i in index], dtype=object)
     given = label.copy()

@@ -48,31 +48,9 @@ def read_cad(
     order of the file, with the solid's name before it where there are several; a solid by its name, else ``body``,
     or ``body 1``, ``body 2``, …. Where a face is covered in part, the rest keeps its name.
 
-    Parameters
-    ----------
-    path : str
-        A STEP, IGES or BREP file.
-    unit : str, optional
-        Unit of a BREP file's numbers, a key of `UNITS`; the others state their own.
-    patches : tuple of SurfacePatch
-        Names for the faces whose centres they contain.
-
-    Returns
-    -------
-    body : netgen.occ.TopoDS_Shape
-        In m.
-    notes : tuple of str
-        A sentence about each thing that was left out, sewn or renamed.
-    naming : FacePatches, optional
-        What names the faces of a mesh of the solid, where a patch is chosen by its direction; until then the faces are
-        called by numbers.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is of another format, or damaged.
-    UsageError
-        If it holds no closed solid, solids overlap, or its size tells of mistaken units.
+    `unit` is that of a BREP file's numbers; STEP and IGES state their own. Returns the body (a
+    netgen.occ.TopoDS_Shape in m), a note about each thing that was left out, sewn or renamed, and, where a patch is
+    chosen by its direction, what names the faces of a mesh of the solid; until then they are called by numbers.
     """
     solids, notes = _solids(path, _load(path))
     for index, solid in enumerate(solids):

@@ -29,19 +29,8 @@ PADDING = 1e-6  # of the part's length, by which a face's box takes the edges ar
 def least_element(solid: Any, coarse: float, grading: float) -> tuple[float, int]:
     """Return the size in m below which no element is made, and how many triangles there would be with finer ones.
 
-    Parameters
-    ----------
-    solid : netgen.occ.TopoDS_Shape
-        Solid in m.
-    coarse : float
-        Largest element size in m.
-    grading : float
-        Growth of the element size per distance.
-
-    Raises
-    ------
-    UsageError
-        If there are too many triangles with any size.
+    The solid is a netgen.occ.TopoDS_Shape in m, `coarse` the largest element size in m, `grading` the growth of the
+    element size per distance.
     """
     least = SHARES[0] * coarse
     count = _triangles(solid, coarse, least, grading)

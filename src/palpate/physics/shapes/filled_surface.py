@@ -43,29 +43,9 @@ SHARP = (
 def read_surface(path: str, unit: str, simplify: float | None = None) -> tuple[Trimesh, Surface]:
     """Read the surface of a file, repaired, simplified if it is large, and searched for faults.
 
-    Parameters
-    ----------
-    path : str
-        A file that `parse_surface` reads.
-    unit : str
-        Unit of its coordinates, a key of `UNITS`.
-    simplify : float, optional
-        Distance in m by which a surface of more than 20,000 triangles may be simplified; by default 1/2,000 of
-        its length, 0 for not at all.
-
-    Returns
-    -------
-    topology : trimesh.Trimesh
-        The surface with its edges, in m.
-    surface : Surface
-        The same with the names of the file's parts, and a note about each repair.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is of another format than its name says, or damaged.
-    UsageError
-        If the surface bounds no body, or its size tells of mistaken units.
+    `unit` is a key of `UNITS`. `simplify` is the distance in m by which a surface of more than 20,000 triangles may
+    be simplified; by default 1/2,000 of its length, 0 for not at all. Returns the surface with its edges, in m, and
+    the same with the names of the file's parts and a note about each repair.
     """
     surface = parse_surface(path)
     surface = replace(surface, points=surface.points * UNITS[unit])
@@ -182,23 +162,8 @@ def name_parts(
 def fill_surface(skin: BodyMesh, volume: float, coarse: float, refinements: tuple[FineMesh, ...]) -> BodyMesh:
     """Return tetrahedra inside a closed surface, whose triangles are renewed.
 
-    Parameters
-    ----------
-    skin : BodyMesh
-        The surface with its names, in m.
-    volume : float
-        Volume that the surface encloses, m³.
-    coarse : float
-        Largest element size in m.
-    refinements : tuple of FineMesh
-        Parts of surfaces that shall have smaller elements.
-
-    Raises
-    ------
-    UsageError
-        If there would be too many elements, or Netgen can't mesh the body.
-    SolverError
-        If Netgen ends its process or takes too long.
+    The skin is in m, `volume` is what it encloses in m³, `coarse` the largest element size in m. SolverError if
+    Netgen ends its process or takes too long.
     """
     low, high = skin.corners
     scale = LENGTH / float((high - low).max())

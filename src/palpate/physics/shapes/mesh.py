@@ -168,15 +168,7 @@ class BodyMesh:
 def outer_faces(tetrahedra: np.ndarray) -> np.ndarray:
     """Faces that belong to one tetrahedron only, in the order of the tetrahedra.
 
-    Parameters
-    ----------
-    tetrahedra : (e, 4) int array
-        Right-handed.
-
-    Returns
-    -------
-    (t, 3) int array
-        Counter-clockwise as seen from outside.
+    The tetrahedra (e, 4) are right-handed; the faces (t, 3) are counter-clockwise as seen from outside.
     """
     faces = tetrahedra[:, FACES].reshape(-1, 3)
     _, inverse, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)

@@ -27,12 +27,8 @@ SIDES = {
 def merge_nodes(points: np.ndarray, shortest: float) -> tuple[np.ndarray, float]:
     """Return for each node the number of the one that stands for its place, and how far apart they are at most, m.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Nodes in m.
-    shortest : float
-        Shortest edge of the mesh in m; nodes that are a tenth of it apart are two.
+    `points` are (n, 3) in m; nodes that are a tenth of `shortest`, the shortest edge of the mesh in m, apart are
+    two.
     """
     length = float(np.ptp(points, axis=0).max())
     node = unite_points(points, min(SAME * length, SHORT * shortest))
@@ -49,21 +45,9 @@ def split_cells(
     subdivide pyramids, prisms and hexahedra into tetrahedra, 8th Int. Meshing Roundtable). A cell with a face that
     lies on tetrahedra of the file, which cut it the other way, gets a node in its middle.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Nodes.
-    solids : list of (str, (k, corners) int array)
-        Cells by kind.
-
-    Returns
-    -------
-    points : (m, 3) array
-        Nodes, with those in the middle of cells behind them.
-    tetrahedra : (e, 4) int array
-        Right-handed where the cells of their kind are all numbered alike.
-    origin : (e,) int array
-        Index of the cell of each, counted through the blocks.
+    `points` are the nodes (n, 3), `solids` the cells (k, corners) by kind. Returns the nodes (m, 3), with those in
+    the middle of cells behind them; tetrahedra (e, 4), right-handed where the cells of their kind are all numbered
+    alike; and the index (e,) of the cell of each, counted through the blocks.
     """
     cut = _cut_by_tetrahedra(solids)
     tetrahedra, origins, middles = [], [], []

@@ -53,20 +53,8 @@ PROPERTY = re.compile(
 def read_source(path: str, labels: str | None = None) -> MeshSource:
     """Read the file of a volume mesh.
 
-    Parameters
-    ----------
-    path : str
-        The file; its ending tells the format.
-    labels : str, optional
-        Name of the cell data that numbers regions and surfaces; by default those of usual names, else the first
-        whole numbers.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is corrupt, or of an unknown format.
-    UsageError
-        If reading it needs a package that is not installed.
+    Its ending tells the format. `labels` names the cell data that numbers regions and surfaces; by default those of
+    usual names, else the first whole numbers.
     """
     source = _read(path, labels)
     require_sound(source)

@@ -96,17 +96,8 @@ def require_budget(volumes: Iterable[tuple[float, float]], fine: Iterable[tuple[
     A size h grows with the distance d from a fine surface as h + grading · d, and a tetrahedron of edge h fills
     h³/6√2. Integrated over d, an area A takes 6√2 A / (2 grading h²) elements.
 
-    Parameters
-    ----------
-    volumes : iterable of (float, float)
-        Volume in m³ and element size in m of each region.
-    fine : iterable of (float, float)
-        Area in m² and element size in m of each refined part.
-
-    Raises
-    ------
-    UsageError
-        With the estimate.
+    `volumes` has the volume in m³ and element size in m of each region, `fine` the area in m² and element size in m
+    of each refined part.
     """
     per_volume = 6 * 2**0.5
     count = sum(per_volume * volume / h**3 for volume, h in volumes)
@@ -125,24 +116,8 @@ def points_on(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
     The triangles are halved across their longest edges until they are small enough. Where the box holds no point,
     the refinement asks for nothing.
 
-    Parameters
-    ----------
-    mesh : BodyMesh
-        Any mesh of the body, coarse for example.
-    refinement : FineMesh
-        The part of a surface, and the element size there.
-
-    Returns
-    -------
-    points : (n, 3) array
-        In m, on the mesh's triangles.
-    area : float
-        That the points stand for, in m².
-
-    Raises
-    ------
-    UsageError
-        If the surface would take too many elements.
+    Any mesh of the body will do, a coarse one for example. Returns the points (n, 3) in m, and the area in m² that
+    they stand for.
     """
     if not members(refinement.surface, mesh.surfaces):
         return np.empty((0, 3)), 0.0
@@ -218,27 +193,9 @@ def mesh_solid(
     The fine part of an upright plane rectangle is cut out of it as a face of its own, so that the size of its
     elements is even; on other faces the element size is restricted at points.
 
-    Parameters
-    ----------
-    solid : netgen.occ.TopoDS_Shape
-        Solid in m, whose faces and solids carry the names.
-    coarse : float
-        Largest element size in m.
-    refinements : tuple of FineMesh
-        Parts of surfaces that shall have smaller elements.
-    rename : function, optional
-        Of the mesh: gives its faces names, where those of the solid are not the ones that refinements speak of.
-    least : float
-        Size in m below which curvature makes no elements; refinements still do.
-
-    Returns
-    -------
-    netgen.meshing.Mesh
-
-    Raises
-    ------
-    UsageError
-        If there would be too many elements, or Netgen can't mesh the solid.
+    The solid is a netgen.occ.TopoDS_Shape in m, the result a netgen.meshing.Mesh. `coarse` is the largest element
+    size in m; below `least`, in m, curvature makes no elements, refinements still do. `rename` gives the mesh's
+    faces names where those of the solid are not the ones that refinements speak of.
     """
     from netgen.meshing import Pnt
     from netgen.occ import OCCGeometry

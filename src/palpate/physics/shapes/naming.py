@@ -36,19 +36,7 @@ def members(name: str, surfaces: Iterable[str]) -> tuple[str, ...]:
 def require_known(kind: str, name: str, known: Iterable[str]) -> None:
     """Refuse a name that the body does not have, and offer the nearest.
 
-    Parameters
-    ----------
-    kind : str
-        Word for what is named, for example ``"surface"``; of surfaces, names of groups are taken too.
-    name : str
-        Name to look up.
-    known : iterable of str
-        Names that the body has.
-
-    Raises
-    ------
-    UsageError
-        If the name is none of them.
+    `kind` is the word for what is named, for example ``"surface"``; of surfaces, names of groups are taken too.
     """
     names = tuple(known)
     if name in names or (kind == "surface" and members(name, names)):

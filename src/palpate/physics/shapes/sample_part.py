@@ -29,17 +29,8 @@ def kidney_surface(subdivisions: int = SUBDIVISIONS) -> tuple[np.ndarray, np.nda
     points along one axis by a function that grows along it, so the surface never cuts itself. It is a smooth stand-in,
     no patient's anatomy.
 
-    Parameters
-    ----------
-    subdivisions : int
-        How often the 20 triangles of an icosahedron are divided into four.
-
-    Returns
-    -------
-    points : (n, 3) array
-        Corners in m; the lowest lies at z = 0.
-    triangles : (t, 3) int array
-        Corners of each triangle, counter-clockwise as seen from outside.
+    The 20 triangles of an icosahedron are divided into four `subdivisions` times. Returns points (n, 3) in m, the
+    lowest at z = 0, and triangles (t, 3), counter-clockwise as seen from outside.
     """
     from trimesh.creation import icosphere
 

@@ -81,19 +81,8 @@ class Geometry(Protocol):
 def require_size(what: str, longest: float, unit: str = "") -> None:
     """Refuse a body whose longest side tells of mistaken units.
 
-    Parameters
-    ----------
-    what : str
-        The body in words, as the message begins.
-    longest : float
-        Its longest side in m.
-    unit : str
-        Unit in which its lengths were read from a file; empty where the user gives them in m.
-
-    Raises
-    ------
-    UsageError
-        If the side is shorter than 1 mm or longer than 10 m.
+    The side must be 1 mm to 10 m, given in m; `what` is the body as the message begins, `unit` that of the file it
+    was read from, empty where the user gives lengths in m.
     """
     if SMALLEST <= longest <= LARGEST:
         return

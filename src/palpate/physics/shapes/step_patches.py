@@ -71,12 +71,8 @@ class FacePatches:
     def labels(self, face: np.ndarray, centres: np.ndarray, normals: np.ndarray) -> list[str]:
         """Return the name of each of t triangles.
 
-        Parameters
-        ----------
-        face : (t,) int array
-            Number of the face that the triangle is part of.
-        centres, normals : (t, 3) arrays
-            Centres in m, and outward unit normals.
+        `face` (t,) is the number of the face that a triangle is part of; `centres` (t, 3) are in m, `normals` (t,
+        3) outward unit vectors.
         """
         label = np.array([self.names[i] for i in face], dtype=object)
         given = label.copy()

@@ -27,17 +27,7 @@ VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 def parse_stl(path: str, content: bytes) -> Surface:
     """Return the triangles of an STL file, each with corners of its own, in the unit of the file.
 
-    Parameters
-    ----------
-    path : str
-        Name of the file, for messages.
-    content : bytes
-        The whole file.
-
-    Raises
-    ------
-    FileFormatError
-        If it is of neither form, cut short, or holds other than finite triangles.
+    `path` is named in messages only; `content` is the whole file.
     """
     text = content[:3].removeprefix(b"\xef\xbb\xbf") + content[3:]
     is_text = text[:512].lstrip()[:5].lower() == b"solid" and (

@@ -29,19 +29,7 @@ Z_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # glTF has y upwards
 def parse_surface(path: str) -> Surface:
     """Return the triangles of a surface's file in its own unit; polygons are cut into triangles.
 
-    Parameters
-    ----------
-    path : str
-        STL, OBJ, PLY, OFF, GLB, VTP or legacy polydata, also packed with gzip.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is of another format, cut short or damaged, or holds other than finite triangles.
-    UsageError
-        If it holds points alone, or a package is needed to read it.
-    SolverError
-        If its reader ends its process.
+    Reads STL, OBJ, PLY, OFF, GLB, VTP or legacy polydata, also packed with gzip.
     """
     content, ending = read_part(path), part_ending(path)
     if ending == ".stl":

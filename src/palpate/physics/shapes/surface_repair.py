@@ -95,17 +95,8 @@ def is_manifold(triangles: np.ndarray) -> bool:
 def unite_points(points: np.ndarray, tolerance: float) -> np.ndarray:
     """Return for each point the number of the node that stands for it: one for each chain of close points.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Positions in m.
-    tolerance : float
-        Distance in m up to which two points are one.
-
-    Returns
-    -------
-    (n,) int array
-        Index of the first point of the chain.
+    `points` are (n, 3) in m; up to `tolerance`, in m, two points are one. Returns the index (n,) of the first point
+    of the chain.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

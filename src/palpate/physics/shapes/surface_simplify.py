@@ -48,14 +48,7 @@ def simplify_surface(surface: Surface, tolerance: float, most: int = MANY) -> Su
 
     Nodes between parts of different labels stay.
 
-    Parameters
-    ----------
-    surface : Surface
-        Closed: each edge belongs to two triangles.
-    tolerance : float
-        Largest distance in m between both surfaces.
-    most : int
-        Number of triangles at which to stop.
+    `tolerance` is the largest distance in m between both surfaces; each edge of `surface` belongs to two triangles.
     """
     for share in SHARES:
         points, triangles, label_of, lead = _collapse(surface, share * tolerance, most)

@@ -16,12 +16,7 @@ _FORM = re.compile(r"\s*((?:\d+(?:-\d+)?\s+)+)of\s+(\d+)\s*")
 def triangle_text(indices: np.ndarray, count: int) -> str:
     """Return triangles as a text.
 
-    Parameters
-    ----------
-    indices : (k,) int array
-        Triangles, from 0 on, in any order.
-    count : int
-        Number of all triangles of the surface.
+    `indices` (k,) count from 0, in any order; `count` is the number of all triangles of the surface.
     """
     chosen = np.unique(indices)
     ends = np.split(chosen, np.flatnonzero(np.diff(chosen) > 1) + 1)

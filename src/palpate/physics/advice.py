@@ -21,17 +21,7 @@ class ModelWarning(UserWarning):
 
 
 def advise(what: str, *, why: str, fix: str) -> None:
-    """Warn, at the line outside of palpate that led here.
-
-    Parameters
-    ----------
-    what : str
-        What is odd, as one sentence.
-    why : str
-        What comes of it.
-    fix : str
-        What the reader can do about it.
-    """
+    """Warn, at the line outside of palpate that led here: what is odd, what comes of it and what to do about it."""
     level, frame = 2, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith("palpate"):
         level, frame = level + 1, frame.f_back
@@ -41,12 +31,7 @@ def advise(what: str, *, why: str, fix: str) -> None:
 def advise_on_modulus(place: str, material: Any) -> None:
     """Warn of a Young's modulus below those of solids, which tells of kPa or MPa taken for Pa.
 
-    Parameters
-    ----------
-    place : str
-        Where the material is, as the sentence goes on: "in the region 'fat'".
-    material : Material
-        Material with its moduli in Pa.
+    `place` says where the material is, as the sentence goes on: "in the region 'fat'".
     """
     young = 2 * material.shear_modulus * (1 + material.poisson)
     if young < SOFTEST:

@@ -29,10 +29,7 @@ def is_foreign(geometry: Any) -> bool:
 
 
 def mesh_apart(function: Callable[..., Any], *arguments: Any, doing: str) -> Any:
-    """Return the `netgen.meshing.Mesh` that a function of a module makes, made in a child process.
-
-    The parameters and exceptions are those of `read_apart`.
-    """
+    """Return the `netgen.meshing.Mesh` that a function makes in a child process, as `read_apart` does."""
     # the round trip is also made where the mesh is made here: a curved one differs by it in its last bits
     return pickle.loads(read_apart(_pickled, function, arguments, doing=doing))
 
@@ -42,21 +39,10 @@ def _pickled(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
 
 
 def read_apart(function: Callable[..., Result], *arguments: Any, doing: str) -> Result:
-    """Return what a function of a module makes of a foreign file, in a child process.
+    """Return what a function at the top of a module makes of a foreign file, in a child process.
 
-    Parameters
-    ----------
-    function : callable
-        Defined at the top of a module.
-    *arguments
-        Of the function.
-    doing : str
-        The work in words, for an error: "meshing the solid of body.stl".
-
-    Raises
-    ------
-    SolverError
-        If the work ends its process, or takes longer than `MESH_LIMIT`.
+    `doing` is the work in words, "meshing the solid of body.stl", for the `SolverError` that is raised if the work ends
+    its process or takes longer than `MESH_LIMIT`.
     """
     try:
         return run_in_child(function, *arguments, limit=MESH_LIMIT)
@@ -71,10 +57,7 @@ def read_apart(function: Callable[..., Result], *arguments: Any, doing: str) -> 
 def solve_apart(problem: Any, x: Any, options: dict[str, Any]) -> Any:
     """Return the solution of a problem of a foreign body, found in a child process.
 
-    Raises
-    ------
-    SolverError
-        If the solver ends its process, or takes longer than a case of a sweep may by default.
+    A solver that ends its process, or takes longer than a case of a sweep may by default, is a `SolverError`.
     """
     try:
         return run_in_child(_solve, problem, x, options, limit=CASE_LIMIT)

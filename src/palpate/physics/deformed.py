@@ -44,7 +44,8 @@ CREASE = math.cos(math.radians(40.0))  # edges sharper than this stay edges
 COLOURS = ("displacement", "von_mises", "largest_strain")
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])  # of a tetrahedron
 SIDES = np.array([[0, 1], [1, 2], [2, 0]])  # of a triangle
-OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # corners of a tetrahedron but each one
+# for each corner of a tetrahedron the three others
+OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a triangle; 3, 4, 5 halve `SIDES`
 # of a tetrahedron; 4 … 9 halve `EDGES`, and the octahedron in the middle is split along 5-8
 EIGHTHS = np.array(
@@ -56,13 +57,7 @@ EIGHTHS = np.array(
 
 
 def require_state(solution: Any) -> None:
-    """Refuse a solution without a deformed state.
-
-    Raises
-    ------
-    UsageError
-        With the solution's own reason.
-    """
+    """Refuse a solution without a deformed state, with its own reason."""
     if not np.all(np.isfinite(solution.displacement)):
         raise UsageError(
             "This solution has no deformed state.",
@@ -74,17 +69,8 @@ def require_state(solution: Any) -> None:
 def ball_of(solution: Any, probe: Any) -> Ball | None:
     """Return the sphere to draw, None for none.
 
-    Parameters
-    ----------
-    solution : SolidSolution
-        Gives the probe's centre, and its own probe.
-    probe : bool, SphereProbe or ((x, y, z), radius)
-        True for the solution's own probe, if it has one; a probe to stand at the solution's centre; or a sphere in m.
-
-    Raises
-    ------
-    UsageError
-        If it is none of these.
+    `probe` is True for the solution's own probe, if it has one, a probe to stand at the solution's centre, or a sphere
+    ((x, y, z), radius) in m.
     """
     if probe is False or probe is None:
         return None
@@ -118,32 +104,15 @@ class FineBody:
 
     An element of second order bends between its vertices, and drawn by these alone a dent a few elements wide looks
     faceted. So elements are drawn in eight and triangles in four, where the mid-side nodes are known.
-
-    Attributes
-    ----------
-    points, displacement : (node, 3) array
-        Positions at rest and displacements, m.
-    triangles : (t, 3) int array
-        Nodes of the outer surface.
-    surface_of : (t,) int array
-        Index into `surfaces` for each triangle.
-    tetrahedra : (e, 4) int array
-        Nodes of the elements' parts.
-    wires : (s, 2) int array
-        Nodes of the edges of the mesh's own triangles, in pieces.
-    edges : (m, 2) int array
-        Vertices that the further nodes lie between.
-    surfaces : tuple of str
-        Names of the surfaces.
     """
 
-    points: np.ndarray
-    displacement: np.ndarray
-    triangles: np.ndarray
-    surface_of: np.ndarray
-    tetrahedra: np.ndarray
-    wires: np.ndarray
-    edges: np.ndarray
+    points: np.ndarray  # (node, 3) positions at rest, m
+    displacement: np.ndarray  # (node, 3) in m
+    triangles: np.ndarray  # (t, 3) nodes of the outer surface
+    surface_of: np.ndarray  # (t,) index into `surfaces` for each triangle
+    tetrahedra: np.ndarray  # (e, 4) nodes of the elements' parts
+    wires: np.ndarray  # (s, 2) nodes of the edges of the mesh's own triangles, in pieces
+    edges: np.ndarray  # (m, 2) vertices that the further nodes lie between
     surfaces: tuple[str, ...]
 
     def spread(self, values: np.ndarray) -> np.ndarray:
@@ -190,21 +159,11 @@ def _middles(edges: np.ndarray, ends: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class NodalField:
-    """A scalar at the nodes of the mesh.
+    """A scalar at the nodes of the mesh."""
 
-    Attributes
-    ----------
-    title : str
-        Words above the colour bar.
-    values : (node,) array
-        Values in `unit`; None for the length of the displacement, which finer nodes know themselves.
-    unit : str
-        SI unit; empty for a pure number, which is shown in per cent.
-    """
-
-    title: str
-    values: np.ndarray | None
-    unit: str
+    title: str  # words above the colour bar
+    values: np.ndarray | None  # (node,) in `unit`; None for the displacement's length, which finer nodes know
+    unit: str  # SI; empty for a pure number, which is shown in per cent
 
     def over(self, body: FineBody) -> np.ndarray:
         """Values at all nodes of the body as it is drawn."""
@@ -214,13 +173,7 @@ class NodalField:
 
 
 def nodal_field(solution: Any, name: str) -> NodalField:
-    """Return a field of a solution by its name, one of `COLOURS`.
-
-    Raises
-    ------
-    UsageError
-        If there is no such field, or the solution was computed without its stresses.
-    """
+    """Return a field of a solution by its name, one of `COLOURS`."""
     checks.one_of("The colour of a picture", name, COLOURS)
     if name == "displacement":
         return NodalField("displacement", None, "m")
@@ -320,18 +273,10 @@ def heights_above(points: np.ndarray, cut: Any) -> np.ndarray:
 
 
 def section(simplices: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    """Return what a plane cuts out of simplices: triangles of tetrahedra, segments of triangles.
+    """Return what a plane cuts out of simplices: triangles of tetrahedra, segments of triangles, (m, d - 1, k).
 
-    Parameters
-    ----------
-    simplices : (n, d, k) array
-        Attributes of the corners of tetrahedra (d = 4) or triangles (d = 3), which are interpolated.
-    heights : (n, d) array
-        Height of each corner above the plane.
-
-    Returns
-    -------
-    (m, d - 1, k) array
+    The attributes of the corners (n, d, k) of tetrahedra (d = 4) or triangles (d = 3) are interpolated; `heights` (n,
+    d) are those of the corners above the plane.
     """
     d = simplices.shape[1]
 
@@ -361,14 +306,7 @@ def section(simplices: np.ndarray, heights: np.ndarray) -> np.ndarray:
 def cut_lines(points: np.ndarray, heights: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Segments (s, 2, 3) between pairs of points, without what lies above a plane.
 
-    Parameters
-    ----------
-    points : (node, 3) array
-        Positions to draw, m.
-    heights : (node,) array
-        Height of each point above the plane.
-    ends : (n, 2) int array
-        Points that the segments join.
+    `points` (node, 3) are in m, `heights` (node,) above the plane; `ends` (n, 2) are the points that segments join.
     """
     h = heights[ends]
     ends, h = ends[(h <= 0).any(axis=1)], h[(h <= 0).any(axis=1)]

@@ -30,7 +30,8 @@ PLAIN = np.array([0.80, 0.72, 0.66])  # a body without colours
 STEEL = np.array([0.72, 0.76, 0.80])  # a probe
 LAMP = np.array([-0.22, 0.50, 0.84]) / math.sqrt(1.004)  # to the right, up and towards the camera
 HALFWAY = (LAMP + np.eye(3)[2]) / np.linalg.norm(LAMP + np.eye(3)[2])  # between lamp and camera
-DARKEST = 0.14  # of viridis is left out, as on the page: the deepest violet hides the shading
+DARKEST = 0.14  # share of viridis that is left out, as on the page: the deepest violet hides the shading
+# colours of lines and words, of hatching, axes and ticks, of the body at rest, of the probe's outline
 INK, SOFT, GHOST, BALL = "#1d2730", "#5d6b76", "#7d8b96", "#2b3640"
 DPI = 110
 BAR = 172  # px that the colour bar takes
@@ -39,23 +40,14 @@ BAR = 172  # px that the colour bar takes
 class Picture:
     """A drawn solution: a notebook shows it, `save` writes it, `show` opens a window.
 
-    Attributes
-    ----------
-    figure : matplotlib.figure.Figure
-        To write on, or to put beside others.
+    Its matplotlib `figure` is there to write on, or to put beside others.
     """
 
     def __init__(self, figure: Any) -> None:
         self.figure = figure
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write PNG, PDF, SVG or JPEG, by the name's ending, and return the path.
-
-        Raises
-        ------
-        UsageError
-            If the ending is none of those, or the file can't be written.
-        """
+        """Write PNG, PDF, SVG or JPEG, by the name's ending, and return the path."""
         target = Path(path)
         try:
             with writing(target) as part:
@@ -67,13 +59,7 @@ class Picture:
         return target
 
     def show(self) -> None:
-        """Open a window and wait until it is closed; to turn the body there is `palpate.show`.
-
-        Raises
-        ------
-        UsageError
-            Where no window can be opened.
-        """
+        """Open a window and wait until it is closed; to turn the body there is `palpate.show`."""
         from matplotlib import get_backend, pyplot
 
         if get_backend().lower() == "agg":
@@ -190,24 +176,12 @@ def plot_solution(
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A camera that looks at a body from far away.
+    """A camera that looks at a body from far away."""
 
-    Attributes
-    ----------
-    axes : (3, 3) array
-        Rows: to the right, up, and towards the camera.
-    centre : (3,) array
-        Point in the middle of the picture, m.
-    scale : float
-        Pixels per metre.
-    size : (width, height)
-        Pixels.
-    """
-
-    axes: np.ndarray
-    centre: np.ndarray
-    scale: float
-    size: tuple[int, int]
+    axes: np.ndarray  # (3, 3) rows: to the right, up, and towards the camera
+    centre: np.ndarray  # (3,) point in the middle of the picture, m
+    scale: float  # pixels per metre
+    size: tuple[int, int]  # pixels: width, height
 
     @classmethod
     def around(cls, points: np.ndarray, view: tuple[float, float], size: tuple[int, int]) -> Camera:
@@ -232,16 +206,9 @@ class Camera:
 def draw_triangles(screen: np.ndarray, attributes: np.ndarray, depth: np.ndarray, image: np.ndarray) -> None:
     """Draw triangles: each pixel keeps the attributes of the nearest one, interpolated linearly.
 
-    Parameters
-    ----------
-    screen : (t, 3, 3) array
-        Column, row and depth of each corner; larger depths are nearer.
-    attributes : (t, 3, k) array
-        What is interpolated; pixels in which the last one is positive are left out.
-    depth : (height, width) array
-        Starts at −inf; changed in place.
-    image : (height, width, k) array
-        Changed in place.
+    `screen` (t, 3, 3) holds column, row and depth of each corner, larger depths nearer. Pixels in which the last of the
+    `attributes` (t, 3, k) is positive are left out. `depth` (height, width), which starts at −inf, and `image` (height,
+    width, k) are changed in place.
     """
     height, width = depth.shape
     last = attributes.shape[2] - 1

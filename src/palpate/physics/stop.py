@@ -31,18 +31,8 @@ class Stop(StrEnum):
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict of a check on a state that Newton's method has accepted.
+    """Verdict of a check on a state that Newton's method has accepted."""
 
-    Attributes
-    ----------
-    stop : Stop
-        `Stop.CONVERGED`, or why the state is not admissible.
-    detail : str
-        Figures that belong to the reason.
-    figures : mapping of str to float
-        Measured figures, for example ``{"penetration": 1e-3}``.
-    """
-
-    stop: Stop = Stop.CONVERGED
-    detail: str = ""
-    figures: Mapping[str, float] = field(default_factory=dict)
+    stop: Stop = Stop.CONVERGED  # `Stop.CONVERGED`, or why the state is not admissible
+    detail: str = ""  # figures that belong to the reason, in words
+    figures: Mapping[str, float] = field(default_factory=dict)  # such as {"penetration": 1e-3}

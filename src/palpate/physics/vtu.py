@@ -22,33 +22,17 @@ __all__ = ["write_pvd", "write_vtu"]
 
 # a number of the whole body, beside the nodes' means of the same name
 TITLES = {"largest_strain": "largest strain at a quadrature point"}
-NOWHERE = -1  # region of a triangle, surface of a tetrahedron
+NOWHERE = -1  # the region of a triangle and the surface of a tetrahedron, which have none
 
 
 def write_vtu(solution: Any, path: str | os.PathLike[str]) -> Path:
-    """Write a solution as a VTU file.
+    """Write a solution, anything with `mesh` and `displacement`, as a file that ends in ``.vtu``, and return its path.
 
     The cells are the tetrahedra and, after them, the triangles of the outer surface. Point data: ``displacement`` (m),
     ``largest strain`` (|λ − 1|) and, where the solution has it, ``von Mises stress`` (Pa). Cell data: ``region`` and
     ``surface``, numbers, −1 where a cell has none; the field data ``region: NAME`` and ``surface: NAME`` hold the
     number of each name (numbers alone, because not every reader takes words there). Field data: what else the solution
     knows of itself, in SI units: energies, response, the probe's centre and radius …
-
-    Parameters
-    ----------
-    solution : SolidSolution
-        Anything with `mesh` and `displacement`.
-    path : path
-        Ending in ``.vtu``.
-
-    Returns
-    -------
-    pathlib.Path
-
-    Raises
-    ------
-    UsageError
-        If the solution did not converge, the file can't be written or its name has another ending.
     """
     import meshio
 
@@ -80,25 +64,10 @@ def write_vtu(solution: Any, path: str | os.PathLike[str]) -> Path:
 def write_pvd(
     solutions: Sequence[Any], path: str | os.PathLike[str], *, values: Iterable[float] | None = None
 ) -> Path:
-    """Write solutions as a series that ParaView plays: a PVD file and a folder of VTU files beside it.
+    """Write solutions as a series that ParaView plays: a PVD file, whose path is returned, and a folder of VTU files.
 
-    Parameters
-    ----------
-    solutions : sequence of SolidSolution
-        Steps of a load path or of time, in order.
-    path : path
-        Ending in ``.pvd``; the steps go to the folder ``NAME``.
-    values : sequence of float, optional
-        Time in s, or load, of each; 0, 1, 2 … by default.
-
-    Returns
-    -------
-    pathlib.Path
-
-    Raises
-    ------
-    UsageError
-        If there are no solutions, not as many values, or a file can't be written.
+    The name ends in ``.pvd``; the steps go to the folder ``NAME`` beside it. `values` are the time in s, or the load,
+    of each of the solutions, which are in order; 0, 1, 2 … by default.
     """
     target = _require_ending(".pvd", path)
     times = list(range(len(solutions))) if values is None else [float(v) for v in values]

@@ -15,26 +15,14 @@ import numpy as np
 from numpy.polynomial import Legendre
 from numpy.polynomial.legendre import leggauss
 
-__all__ = [
-    "LineElements",
-    "Strains",
-]
+__all__ = ["LineElements", "Strains"]
 
 
 class Strains:
     """Strain measures at the points of one state, and their derivatives.
 
-    Parameters
-    ----------
-    motion : (..., 4) array
-        u', v', t' (1/m) and t (rad).
-    large : bool
-        Geometrically exact, or small displacements.
-
-    Attributes
-    ----------
-    values : (..., 3) array
-        Axial strain, shear strain and curvature in 1/m.
+    `motion` (..., 4) holds u', v', t' (1/m) and t (rad); the measures are geometrically exact if `large`, else those of
+    small displacements. `values` (..., 3) are the axial strain, the shear strain and the curvature in 1/m.
     """
 
     def __init__(self, motion: np.ndarray, *, large: bool) -> None:
@@ -95,21 +83,9 @@ FIELDS = 3  # u, v, t
 class LineElements:
     """Shape functions of one polynomial order on the elements between ascending vertices.
 
-    Parameters
-    ----------
-    vertices : (node,) array
-        Positions of the vertices in m, ascending; the values at the first one are clamped.
-    order : int
-        Polynomial order p; p + 1 Gauss points an element integrate squares of the fields exactly.
-
-    Attributes
-    ----------
-    size : int
-        Number of free values, those of the first vertex left out.
-    weights : (element, point) array
-        Weights of the Gauss points in m.
-    vertex_values : (node - 1, 3) array of int
-        Indices of the free values of the vertices but the first.
+    The values at the first of `vertices` (node,), in m, are clamped and left out of the `size` free values. Of order p,
+    p + 1 Gauss points an element integrate squares of the fields exactly; `weights` (element, point) are theirs in m.
+    `vertex_values` (node - 1, 3) are the indices of the free values of the other vertices.
     """
 
     def __init__(self, vertices: np.ndarray, order: int) -> None:
@@ -142,15 +118,8 @@ class LineElements:
     def forces(self, density: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Integrate generalised forces, conjugate to u', v', t' and t, against the shape functions.
 
-        Parameters
-        ----------
-        density : (element, point, 4) array
-            N or N·m for the derivatives, N for t.
-
-        Returns
-        -------
-        (size,) array and (3,) array
-            Nodal forces at the free values, and those at the clamp.
+        The density (element, point, 4) is in N or N·m for the derivatives, in N for t. The nodal forces at the free
+        values (size,) come back, and those at the clamp (3,).
         """
         weighted = (density * self.weights[..., None]).reshape(len(self.weights), 1, -1)
         nodal = (weighted @ self._gradients)[:, 0]

@@ -37,18 +37,9 @@ BALANCED = 1e-14  # share of the energy below which what is left to be gained co
 
 
 class BeamEnergy:
-    """Finite elements of a clamped plane beam over a section law.
+    """Finite elements of a clamped plane beam over a section law, geometrically exact if `large`.
 
-    Parameters
-    ----------
-    vertices : (node,) array
-        Positions of the mesh's vertices in m, ascending; the first one is clamped.
-    order : int
-        Polynomial order of the elements, 2 or more.
-    law : SectionLaw
-        Section forces of strains.
-    large : bool
-        Geometrically exact, or small displacements.
+    The first of the ascending `vertices` (node,), in m, is clamped; the elements are of polynomial order 2 or more.
     """
 
     def __init__(self, vertices: np.ndarray, order: int, law: SectionLaw, *, large: bool) -> None:
@@ -108,16 +99,9 @@ class _State:
 
 
 class BeamStep:
-    """One step of a beam (an `EnergyModel`).
+    """One step of a beam (an `EnergyModel`), from the internal variables at its beginning.
 
-    Parameters
-    ----------
-    beam : BeamEnergy
-        Its finite elements.
-    internal : value
-        Internal variables at the beginning of the step.
-    dt : float or None
-        Length of the step in s; None is an instant.
+    Its length `dt` is in s; None is an instant.
     """
 
     def __init__(self, beam: BeamEnergy, internal: Any, dt: float | None) -> None:
@@ -205,12 +189,7 @@ class BeamStep:
 class BandedTangent:
     """A symmetric matrix K in upper banded storage (band + 1, dof), and M to shift it by (a `Tangent`).
 
-    Parameters
-    ----------
-    banded : (band + 1, dof) array
-        K, with the diagonal in the last row.
-    shifter : callable, optional
-        Returns M in the same storage; asked for once, and only where K is indefinite. By default there is none.
+    The diagonal is the last row. `shifter` returns M in the same storage; it is asked once, where K is indefinite.
     """
 
     def __init__(self, banded: np.ndarray, shifter: Callable[[], np.ndarray] | None = None) -> None:

@@ -124,13 +124,7 @@ def TipLoad(
 
 
 def as_loads(loads: Load | Sequence[Load]) -> tuple[Load, ...]:
-    """Return one load or several, as a tuple with distinct names.
-
-    Raises
-    ------
-    UsageError
-        Without loads, or if two share a name.
-    """
+    """Return one load or several, as a tuple that is not empty and has distinct names."""
     several = tuple(loads) if isinstance(loads, Iterable) else (loads,)
     for load in several:
         if not (hasattr(load, "inputs") and hasattr(load, "knots")):

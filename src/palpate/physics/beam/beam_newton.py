@@ -24,25 +24,18 @@ import numpy as np
 
 from palpate.physics.stop import Stop
 
-__all__ = [
-    "EnergyModel",
-    "Equilibrium",
-    "LoadPath",
-    "Tangent",
-    "follow",
-    "lower_state",
-    "minimise",
-]
+__all__ = ["EnergyModel", "Equilibrium", "LoadPath", "Tangent", "follow", "lower_state", "minimise"]
 
 ARMIJO = 1e-4  # share of the predicted decrease that a step must bring (Nocedal & Wright 2006, eq. 3.4)
 ROUND_OFF = 1e-6  # below this relative error energy differences drown in round-off: steps are taken whole
+# factors of a tangent's shifter M, tried in turn until the shifted tangent is positive definite
 SHIFTS = (0.0, *(1e-4 * 3.0**power for power in range(16)))
 SHORTEST_STEP = 2.0**-14  # of a line search, as a share of Newton's step
 
 NEWTON_LIMIT = 60  # a load step that needs more iterations is cheaper in two halves
 TOTAL_LIMIT = 600  # iterations over a whole path: bounds the time that a pointless load costs
 SMALLEST_STEP = 2.0**-10  # of a path, as a share of its length
-GROWTH = 2.0
+GROWTH = 2.0  # factor of the next step of a path after one that succeeded
 
 
 class Tangent(Protocol):
@@ -89,23 +82,9 @@ def minimise(
     tolerance: float = 1e-10,
     limit: int = 30,
 ) -> Equilibrium:
-    """Minimise W(z) - load·z from `start`.
+    """Minimise W(z) - load·z from `start` (dof,), to a relative error `tolerance` in the energy norm.
 
-    Parameters
-    ----------
-    model : EnergyModel
-        Energy and its derivatives.
-    load, start : (dof,) array
-        Load f, and the unknowns to begin from.
-    tolerance : float
-        Relative error in the energy norm.
-    limit : int
-        Largest number of iterations.
-
-    Returns
-    -------
-    Equilibrium
-        Never raises for want of convergence: `stop` says how it ended.
+    It never raises for want of convergence: `Equilibrium.stop` says how the iteration ended.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # overflow shows as an error that is not finite
         return _iterate(model, load, start, tolerance, limit)
@@ -183,32 +162,17 @@ def follow(
     admit: Callable[[np.ndarray], Stop],
     near: Callable[[np.ndarray, np.ndarray], bool],
 ) -> Equilibrium:
-    """Follow the equilibrium along a path of loads.
+    """Follow the equilibrium along a path of loads; the result has the iterations of all steps.
 
-    The whole path is tried in one step first. A step that fails is halved, one that succeeds is doubled. So is a
-    step halved that leads far away: under a large load a body may have several stable equilibria, and a long
-    step may fall into another one than that which the load leads to. What is still far after the smallest step
-    is where the body snaps to.
+    The whole path is tried in one step first. A step that fails is halved, one that succeeds is doubled. So is a step
+    halved that leads far away: under a large load a body may have several stable equilibria, and a long step may fall
+    into another one than that which the load leads to. What is still far after the smallest step is where the body
+    snaps to.
 
-    Parameters
-    ----------
-    model : EnergyModel
-        Energy and its derivatives.
-    path : LoadPath
-        Its loads, and the equilibrium at its beginning.
-    predictor : (dof,) array
-        Guess of the state at the path's end; where it lowers the energy it replaces the start.
-    admit : callable
-        Returns for an equilibrium's unknowns `Stop.CONVERGED`, or why the model does not hold there, which ends
-        the path.
-    near : callable
-        Returns whether an equilibrium's unknowns (second) are near enough to those before the step (first) to be of the
-        same branch of equilibria.
-
-    Returns
-    -------
-    Equilibrium
-        With the iterations of all steps.
+    `predictor` (dof,) is a guess of the state at the path's end; where it lowers the energy it replaces the start.
+    `admit` returns for an equilibrium's unknowns `Stop.CONVERGED`, or why the model does not hold there, which ends the
+    path. `near` tells whether an equilibrium's unknowns (second) are near enough to those before the step (first) to be
+    of the same branch of equilibria.
     """
     state, position, step, spent, trusted = path.state, 0.0, 1.0, 0, True
     while True:

@@ -51,18 +51,8 @@ class Preset:
 def _founding_beam(material: str) -> Cantilever:
     """The cantilever of Narayanan, Singla, Garimella, Waz & Krovi 2011: L = 1 m, r = 5 mm, six nodes.
 
-    The founding text is ambiguous. It gives the length as 0.1 m and its node table as 1 m; 1 m is taken here.
-    It gives the loads as 0 … 10 N by 0.05 and as 0 … 5 N by 0.01; both are presets.
-
-    Parameters
-    ----------
-    material : str
-        ``"copper"`` or ``"nylon"``, or another name that `named_material` knows.
-
-    Raises
-    ------
-    UsageError
-        If the material is not known.
+    The founding text is ambiguous. It gives the length as 0.1 m and its node table as 1 m; 1 m is taken here. It gives
+    the loads as 0 … 10 N by 0.05 and as 0 … 5 N by 0.01; both are presets. Its materials are copper and nylon.
     """
     return Cantilever(
         length=1.0, section=Circle(radius=0.005), material=named_material(material, LinearElastic)

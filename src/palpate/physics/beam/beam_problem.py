@@ -23,10 +23,7 @@ if TYPE_CHECKING:
     from palpate.physics.beam.cantilever import Cantilever
     from palpate.physics.beam.history_solver import HistorySolver
 
-__all__ = [
-    "BeamProblem",
-    "Solution",
-]
+__all__ = ["BeamProblem", "Solution"]
 
 _DISSIPATED = Field("dissipated", unit="J", meaning="energy lost for good since the virgin beam")
 

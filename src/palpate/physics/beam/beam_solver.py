@@ -26,17 +26,7 @@ FAR_BEND, FAR_TURN = 0.5, 2.0  # rad
 class LoadedBeam:
     """Finite elements of a beam with the vectors of its loads, and the checks that all its solves share.
 
-    Parameters
-    ----------
-    problem : BeamProblem
-        Beam and loads.
-
-    Attributes
-    ----------
-    energy : BeamEnergy
-        The finite elements.
-    weight : (dof,) array
-        Load vector of the beam's weight, zero without it.
+    `weight` (dof,) is the load vector of the beam's weight, zero without it.
     """
 
     def __init__(self, problem: BeamProblem) -> None:
@@ -120,14 +110,9 @@ class _Solved:
 
 
 class BeamSolver:
-    """Finite elements of one problem, kept open between solves.
+    """Finite elements of one problem of an elastic beam, kept open between solves.
 
     Each solve starts from the last converged one, so neighbouring loads are cheap when asked in order.
-
-    Parameters
-    ----------
-    problem : BeamProblem
-        An elastic beam and its loads.
     """
 
     def __init__(self, problem: BeamProblem) -> None:
@@ -142,24 +127,9 @@ class BeamSolver:
         self._last = self._before = _Solved(rest, rest)
 
     def solve(self, x: Any, start: Solution | None = None) -> Solution:
-        """Find the equilibrium under loads `x`.
+        """Find the equilibrium under loads `x` (n,) in N, from a converged solution or by default the last one.
 
-        Parameters
-        ----------
-        x : (n,) array or float
-            Sizes of the loads in N.
-        start : Solution, optional
-            A converged solution of this problem to start from; by default the solver's last one.
-
-        Returns
-        -------
-        Solution
-            `Solution.converged` is true where there is one; `Solution.message` says why not.
-
-        Raises
-        ------
-        UsageError
-            If `x` has not one number per load.
+        `Solution.converged` is true where there is one; `Solution.message` says why not.
         """
         sizes = self._problem.sizes(x)
         if not np.isfinite(sizes).all():
@@ -174,13 +144,7 @@ class BeamSolver:
         return self._answer(load, end)
 
     def march(self, loads: Any, times: Any = None) -> list[Solution]:
-        """Solve for one row of loads (N, n) or (N,) after the other; their times (N,) in s are only noted.
-
-        Raises
-        ------
-        UsageError
-            If a row has not one number per load, or there are not as many times as rows.
-        """
+        """Solve for one row of loads (N, n) or (N,) after the other; their times (N,) in s are only noted."""
         rows = list(np.asarray(loads, dtype=float))
         clock = np.full(len(rows), np.nan) if times is None else np.asarray(times, dtype=float)
         if clock.shape != (len(rows),):

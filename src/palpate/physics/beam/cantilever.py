@@ -21,7 +21,7 @@ __all__ = ["Cantilever"]
 
 Kinematics = Literal["large", "small"]
 FIBRES = 48  # with them the plastic moment of a circle is right to 5e-4
-TOLERANCE = 1e-5
+TOLERANCE = 1e-5  # relative error of a step of a history, unless another one is given
 LONGEST = 100.0  # m: a longer beam was meant in mm
 
 

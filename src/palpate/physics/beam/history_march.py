@@ -20,65 +20,34 @@ __all__ = ["Failure", "Moment", "SteppedBody", "march"]
 # Shares of the way between two loads: a body that finds no equilibrium in so short a step has none, while the first
 # moments of a long creep may need a very short one
 SMALLEST_FAILED, SMALLEST_STEP = 2.0**-10, 2.0**-40
+# largest and smallest factor of the next step, and the share of the step that the error allows which is taken
 GROWTH, SHRINKAGE, SAFETY = 4.0, 0.2, 0.8
 WASTE_LIMIT = 600  # iterations of steps that found nothing: bounds the time that a pointless load costs
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """A moment of a history: all that the body's future depends on, and the cost of finding it.
+    """A moment of a history: all that the body's future depends on, and the cost of finding it."""
 
-    Attributes
-    ----------
-    time : float
-        In s; for a body that knows no time, any number that does not fall.
-    load, z : (dof,) arrays
-        Loads and unknowns.
-    internal : value
-        Internal variables of the sections.
-    dissipated : float
-        Energy in J lost for good so far.
-    reach : float
-        Largest displacement in m so far.
-    iterations : int
-        Newton iterations spent on the way here.
-    residual : float
-        Relative error in the energy norm.
-    """
-
-    time: float
-    load: np.ndarray
-    z: np.ndarray
-    internal: Any
-    dissipated: float = 0.0
-    reach: float = 0.0
-    iterations: int = 0
-    residual: float = 0.0
+    time: float  # s; for a body that knows no time, any number that does not fall
+    load: np.ndarray  # (dof,) load vector
+    z: np.ndarray  # (dof,) unknowns
+    internal: Any  # internal variables of the sections
+    dissipated: float = 0.0  # J lost for good so far
+    reach: float = 0.0  # m, the largest displacement so far
+    iterations: int = 0  # Newton iterations spent on the way here
+    residual: float = 0.0  # relative error in the energy norm
 
 
 @dataclass(frozen=True, eq=False)
 class Failure:
-    """The reason for which a march ended without reaching its load.
-
-    Attributes
-    ----------
-    stop : Stop
-        Why it ended.
-    moment : Moment
-        The last good one.
-    z : (dof,) array
-        Unknowns at which the search gave up.
-    iterations : int
-        Newton iterations spent.
-    share : float
-        How far the load had come on its way.
-    """
+    """The reason for which a march ended without reaching its load."""
 
     stop: Stop
-    moment: Moment
-    z: np.ndarray
-    iterations: int
-    share: float = 0.0
+    moment: Moment  # the last good one
+    z: np.ndarray  # (dof,) unknowns at which the search gave up
+    iterations: int  # Newton iterations spent in all
+    share: float = 0.0  # share of its way that the load had come
 
 
 class SteppedBody(Protocol):
@@ -108,23 +77,9 @@ class _Way:
 
 
 def march(body: SteppedBody, start: Moment, time: float, load: np.ndarray) -> Moment | Failure:
-    """March from a moment to a time and a load.
+    """March from a moment to a time in s and a load (dof,); the time of the start means a load put on at once.
 
-    Parameters
-    ----------
-    body : SteppedBody
-        Takes the steps.
-    start : Moment
-        Where the march begins.
-    time : float
-        Time of its end in s; that of the start means a load put on at once.
-    load : (dof,) array
-        Load at its end.
-
-    Returns
-    -------
-    Moment or Failure
-        With the iterations of all steps. Never raises for want of an equilibrium.
+    What comes back has the iterations of all steps; for want of an equilibrium it is a `Failure`, nothing is raised.
     """
     way, moment, done, step, spent, wasted = _Way(start, time, load), start, 0.0, 1.0, 0, 0
     slope = np.zeros_like(start.z)

@@ -25,11 +25,6 @@ class HistorySolver:
 
     It remembers nothing between calls: each answer belongs to a history that is given in full, so it is the same
     whatever was asked before.
-
-    Parameters
-    ----------
-    problem : BeamProblem
-        A beam with memory and its loads.
     """
 
     def __init__(self, problem: BeamProblem) -> None:
@@ -42,23 +37,7 @@ class HistorySolver:
         """Do nothing: there is nothing to forget. Every solver has this method."""
 
     def solve(self, x: Any) -> Solution:
-        """Run through the history that the inputs mean, from the virgin beam.
-
-        Parameters
-        ----------
-        x : (n,) array or float
-            The problem's inputs.
-
-        Returns
-        -------
-        Solution
-            At the end of the history.
-
-        Raises
-        ------
-        UsageError
-            If `x` has not one number per input.
-        """
+        """Return the solution at the end of the history that the inputs `x` (n,) mean, from the virgin beam."""
         values = self._problem.sizes(x)
         if not np.isfinite(values).all():
             return self._beam.failure(Stop.BAD_INPUT, 0, "")
@@ -67,27 +46,11 @@ class HistorySolver:
         return replace(solutions[-1], iterations=sum(solution.iterations for solution in solutions))
 
     def march(self, loads: Any, times: Any = None, *, start: Solution | None = None) -> list[Solution]:
-        """Follow a history of loads.
+        """Follow a history of loads (N, n) or (N,) in N, and return a solution for each row.
 
-        Parameters
-        ----------
-        loads : (N, n) or (N,) array
-            Sizes of the n loads in N, in the order of the history; between two of them they change evenly.
-        times : (N,) array, optional
-            In s, not falling; two equal ones are loads put on at once. Viscoelastic beams need them; for the others
-            they are only noted.
-        start : Solution, optional
-            What to go on from; by default the virgin beam, without loads at the time 0.
-
-        Returns
-        -------
-        list of Solution
-            One for each row; after a failure all others fail, too.
-
-        Raises
-        ------
-        UsageError
-            If the arrays do not fit, the times fall or are missing, or the start has no history.
+        Between two rows the loads change evenly. The times (N,) in s do not fall; two equal ones are loads put on at
+        once. Viscoelastic beams need them; for the others they are only noted. The history goes on from `start`, by
+        default the virgin beam without loads at the time 0. After a failure all later rows fail, too.
         """
         begun = self._virgin() if start is None else self._moment_of(start)
         sizes = self._rows(loads)

@@ -80,24 +80,12 @@ class BeamMaterial(Protocol):
 
 
 class SectionAnswer(NamedTuple):
-    """Answer of sections to strains at the end of a step.
+    """Answer of sections to strains at the end of a step."""
 
-    Attributes
-    ----------
-    energy : (...) array
-        Incremental energy in J/m.
-    force : (..., 3) array
-        N and Q in N, M in N·m.
-    tangent : (..., 3, 3) array
-        Their derivatives by the strains, or one (3, 3) for all.
-    internal : value
-        Internal variables at the end of the step; None without memory.
-    """
-
-    energy: np.ndarray
-    force: np.ndarray
-    tangent: np.ndarray
-    internal: Any
+    energy: np.ndarray  # (...) incremental energy, J/m
+    force: np.ndarray  # (..., 3) N and Q in N, M in N·m
+    tangent: np.ndarray  # (..., 3, 3) derivatives of the force by the strains, or one (3, 3) for all
+    internal: Any  # internal variables at the end of the step; None without memory
 
 
 class SectionLaw(Protocol):
@@ -126,13 +114,7 @@ class SectionLaw(Protocol):
 
 
 class ElasticSection:
-    """A section of constant stiffnesses (a `SectionLaw`).
-
-    Parameters
-    ----------
-    stiffness : (3,) array
-        EA and kGA in N, EI in N·m².
-    """
+    """A section of constant stiffnesses (3,): EA and kGA in N, EI in N·m² (a `SectionLaw`)."""
 
     quadratic = True
 
@@ -160,18 +142,9 @@ class ElasticSection:
 
 
 class PlasticSection:
-    """A section of elastoplastic fibres (a `SectionLaw`).
+    """A section that is cut into layers of elastoplastic fibres across its height (a `SectionLaw`).
 
-    Parameters
-    ----------
-    section : FibreSection
-        Its shape, which is cut into fibres.
-    law : UniaxialPlastic
-        Stress of each fibre.
-    shear_stiffness : float
-        kGA in N.
-    fibres : int
-        Number of layers across the height.
+    The law gives the stress of each fibre; the shear stiffness kGA in N stays elastic.
     """
 
     quadratic = False
@@ -227,15 +200,7 @@ class PlasticSection:
 
 
 class ViscousSection:
-    """A section whose stiffnesses relax together (a `SectionLaw`).
-
-    Parameters
-    ----------
-    stiffness : (3,) array
-        The instantaneous EA and kGA in N, EI in N·m².
-    prony : PronySeries
-        Their common relaxation.
-    """
+    """A section whose instantaneous stiffnesses (3,), EA and kGA in N, EI in N·m², relax together (a `SectionLaw`)."""
 
     quadratic = True
 

@@ -36,21 +36,11 @@ COVERED = 0.98
 
 @dataclass(frozen=True)
 class Chart:
-    """A surface seen along an axis: two coordinates give its points.
-
-    Attributes
-    ----------
-    surface : str
-        Name of the surface.
-    axis : int
-        Index of the axis that the surface faces.
-    sign : float
-        1 where it faces along the axis, -1 against it.
-    """
+    """A surface seen along an axis: two coordinates give its points."""
 
     surface: str
-    axis: int
-    sign: float
+    axis: int  # index of the axis that the surface faces
+    sign: float  # 1 where it faces along the axis, -1 against it
 
     @property
     def across(self) -> tuple[int, int]:
@@ -71,16 +61,9 @@ class Chart:
 
 
 def bump(chart: Chart, centre: tuple[Any, Any], radius: float) -> Any:
-    """Return ρ as a coefficient function on the surface.
+    """Return ρ as a coefficient function on the surface, with the centre p and the radius a in m.
 
-    Parameters
-    ----------
-    chart : Chart
-        How the surface is seen.
-    centre : tuple of two floats or ngsolve.Parameter
-        p in m.
-    radius : float
-        a in m.
+    The two numbers of the centre may be parameters of NGSolve.
     """
     import ngsolve as ng
 
@@ -100,10 +83,7 @@ def bump_area(radius: float) -> float:
 def chart_of(mesh: BodyMesh, surface: str, facing: str | None = None) -> Chart:
     """Return the chart of a whole surface, along `facing` or the axis nearest to its mean normal.
 
-    Raises
-    ------
-    UsageError
-        If there is no such surface, or it has no mean normal and `facing` is not given.
+    A surface whose normals cancel has no mean normal and needs `facing`.
     """
     require_known("surface", surface, mesh.surfaces)
     if facing is not None:
@@ -119,13 +99,7 @@ def chart_of(mesh: BodyMesh, surface: str, facing: str | None = None) -> Chart:
 
 
 def chart_at(mesh: BodyMesh, surface: str, point: tuple[float, float, float]) -> Chart:
-    """Return the chart along the axis that the surface faces at a point (3,) in m.
-
-    Raises
-    ------
-    UsageError
-        If there is no such surface, or the point is not on it.
-    """
+    """Return the chart along the axis that the surface faces at a point (3,) in m, which must be on it."""
     require_known("surface", surface, mesh.surfaces)
     nearest, normal, distance = Patch.from_mesh(mesh, surface).nearest(np.asarray(point))
     size = float(np.linalg.norm(mesh.corners[1] - mesh.corners[0]))
@@ -146,23 +120,9 @@ def _along(surface: str, normal: np.ndarray) -> Chart:
 def require_on_surface(
     mesh: BodyMesh, chart: Chart, lower: np.ndarray, upper: np.ndarray, radius: float
 ) -> None:
-    """Refuse bumps that hang over the edge of the surface.
+    """Refuse bumps of which more than a fiftieth hangs over the edge of the surface.
 
-    Parameters
-    ----------
-    mesh : BodyMesh
-        The body at rest.
-    chart : Chart
-        How the surface is seen.
-    lower, upper : (2,) array
-        Corners in m of the rectangle in which the centre of the bump may be.
-    radius : float
-        Radius of the bump in m.
-
-    Raises
-    ------
-    UsageError
-        If more than a fiftieth of any bump is off the surface.
+    `lower` and `upper` (2,) are the corners in m of the rectangle in which the centre may be, `radius` is in m.
     """
     facing = chart.sign * mesh.area_vectors[:, chart.axis] > 0
     mine = facing & mesh.on(chart.surface)

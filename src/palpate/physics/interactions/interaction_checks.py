@@ -42,13 +42,7 @@ MOTIONS = (
 
 
 def interval(what: str, value: Any, unit: str) -> Interval:
-    """Return a finite number, or two finite numbers in ascending order.
-
-    Raises
-    ------
-    UsageError
-        For anything else, an empty range among it.
-    """
+    """Return a finite number, or two finite numbers in ascending order: an empty range is refused."""
     if isinstance(value, str) or not isinstance(value, Iterable):
         return checks.finite(what, value, unit)
     ends = tuple(value)
@@ -69,13 +63,7 @@ def interval(what: str, value: Any, unit: str) -> Interval:
 
 
 def range_of(what: str, value: Any, unit: str) -> tuple[float, float]:
-    """Return the two ends of a range in ascending order.
-
-    Raises
-    ------
-    UsageError
-        For anything else, a single number among it.
-    """
+    """Return the two ends of a range in ascending order; a single number is refused."""
     ends = interval(what, value, unit)
     if isinstance(ends, tuple):
         return ends
@@ -87,13 +75,7 @@ def range_of(what: str, value: Any, unit: str) -> tuple[float, float]:
 
 
 def direction_of(what: str, value: Any) -> tuple[float, float, float]:
-    """Return a direction as a unit vector; ``"x"``, ``"-z"`` and the like stand for axes.
-
-    Raises
-    ------
-    UsageError
-        If it is neither an axis nor three numbers with a length.
-    """
+    """Return a direction as a unit vector; ``"x"``, ``"-z"`` and the like stand for axes."""
     if isinstance(value, str):
         axis, sign = axis_of(what, value)
         return (sign * (axis == 0) + 0.0, sign * (axis == 1) + 0.0, sign * (axis == 2) + 0.0)

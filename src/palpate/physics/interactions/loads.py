@@ -40,13 +40,7 @@ if TYPE_CHECKING:
     from palpate.physics.shapes.mesh import BodyMesh
     from palpate.physics.shapes.meshing import FineMesh
 
-__all__ = [
-    "BodyForce",
-    "PointForce",
-    "Pressure",
-    "SurfaceTraction",
-    "volume_density",
-]
+__all__ = ["BodyForce", "PointForce", "Pressure", "SurfaceTraction", "volume_density"]
 
 Ends = tuple[float, float]
 Point = tuple[float, float, float]
@@ -258,12 +252,7 @@ POTENTIAL = 1e-8  # largest difference, relative to the force, that round-off ma
 def volume_density(displacement: Any, origin: Point) -> Any:
     """Return ⅓ (X + u - origin) · cof(F) N on a surface, as a coefficient function in m.
 
-    Parameters
-    ----------
-    displacement : ngsolve.CoefficientFunction
-        u (3,), a trial function or a grid function.
-    origin : tuple of three floats
-        In m.
+    u (3,) is a trial function or a grid function of NGSolve, the origin is in m.
     """
     import ngsolve as ng
 

@@ -26,32 +26,21 @@ from palpate.format import millimetres, number
 from palpate.physics.advice import ModelWarning, advise
 from palpate.physics.interactions.sphere_contact import REACH, pressed_energy
 
-__all__ = [
-    "PadShare",
-    "advise_on_pad",
-    "pad_depth",
-    "pad_share",
-]
+__all__ = ["PadShare", "advise_on_pad", "pad_depth", "pad_share"]
 
 LARGE = 0.5  # share of the depth: from here on more of it is the pad's than the body's
 SMALL = 0.1  # share that the pad advised would take
-CHANGE = 0.2  # of ln k: right to about 1e-3, h²/24 times the share's curvature in ln k
+# difference h of ln k in a quotient, which is right to about 1e-3: h²/24 times the share's curvature in ln k
+CHANGE = 0.2
 # A tangent jumps a little wherever a quadrature point comes into contact. So the stiffness is taken from forces, at
 # the inputs and where the force is less by about this share: there equilibria are sure to exist.
 NEAR = 0.1
 
 
 def pad_depth(probe: Any, modulus: float, depth: float) -> float:
-    """Return the depth in m by which the pad of a sphere is pressed at a depth of the probe.
+    """Return the depth in m by which the pad of a sphere is pressed at a depth of the probe in m, positive.
 
-    Parameters
-    ----------
-    probe : SphereProbe
-        The sphere and its pad.
-    modulus : float
-        E* = E/(1 − ν²) of the body in Pa.
-    depth : float
-        Depth of the probe in m, positive.
+    `modulus` is E* = E/(1 − ν²) of the body in Pa.
     """
     low, high = 0.0, depth if probe.stop is None else min(depth, REACH * probe.stop)
     for _ in range(50):  # the pad's force grows with its share, the body's falls

@@ -21,10 +21,7 @@ from palpate.units import Range
 if TYPE_CHECKING:
     from palpate.physics.shapes.meshing import FineMesh
 
-__all__ = [
-    "PrescribedDisplacement",
-    "roller",
-]
+__all__ = ["PrescribedDisplacement", "roller"]
 
 Point = tuple[float, float, float]
 Ends = tuple[float, float]

@@ -32,22 +32,21 @@ __all__ = ["SphereProbe"]
 
 ELEMENT = 0.5  # element size under the probe over its radius: the force then ripples by < 0.2 % from 0.1 R of depth on
 ROUND_ELEMENT = 0.4  # the same on curved surfaces, where the elements' shape adds to the error
-LAYERED_ELEMENT = (
-    0.25  # in bodies of several regions: on a skin over soft fat 0.5 makes the force 3 to 7 % too large
-)
+# the same in bodies of several regions: on a skin over soft fat 0.5 makes the force 3 to 7 % too large
+LAYERED_ELEMENT = 0.25
 MARGIN = 1.3  # how far beyond its contact points the probe may touch, over its radius
-END = 1e-3  # of the radius: as near as that the box of contact points ends where the surface does
+# share of the radius: a box of contact points that ends so near to the surface's rim ends there
+END = 1e-3
 INSET = 3.0  # distance of the contact points from the surface's rim over the radius, unless it is given
 MOST_INSET = 0.4  # the same, at most, over the surface's width
 SIDEWAYS = 3.0  # how much dearer a move across is than one along the normal
 FIRST = 0.25  # first step along the approach over the radius
 FIRST_PRESSED = 0.5  # the same, at most, over the pad's stop: staying is then an admissible guess
-FIRST_DEPTH = (
-    0.25  # the same, at most, over the largest depth: a large sphere's radius says nothing of the way
-)
+# the same, at most, over the largest depth: a large sphere's radius says nothing of the way
+FIRST_DEPTH = 0.25
 OPEN = 0.3  # length of a surface's mean normal from which on it is looked at along one axis
-CLEAR = 1e-9  # of the radius: roundings
-MOST_STEPS = 50  # of the search for a place outside
+CLEAR = 1e-9  # share of the radius that rounding may take of a sphere's distance from the surface
+MOST_STEPS = 50  # steps along the normal after which the search for a place outside is given up
 
 Corner = tuple[float, ...]
 

@@ -22,47 +22,29 @@ from palpate.physics.interactions.surface_patch import Patch, winding_number
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.stop import Stop, Verdict
 
-__all__ = [
-    "REACH",
-    "Contact",
-    "pad_energy",
-    "pressed_energy",
-]
+__all__ = ["REACH", "Contact", "pad_energy", "pressed_energy"]
 
 REACH = 0.98  # share of the stop up to which states are admissible
 BONUS = 6  # orders of quadrature beyond the elements' own: contact has an edge within elements
-WAY = 0.05  # distance over the radius at which a way is looked at
+WAY = 0.05  # distance of the places at which a sphere's way is looked at, over the radius
 TINY = 1e-9  # m; keeps the distance to the sphere's centre differentiable
-FACING_AWAY = -0.1  # cosine; less than a right angle by more than a fold of the surface takes
+# cosine from a surface's normal to the sphere's centre, below which the surface faces away: a fold of it takes less
+FACING_AWAY = -0.1
 
 
 def pressed_energy(penetration: Any, pad: float, stop: float | None) -> Any:
-    """Return φ(p) = ½ k p²/(1 − p/p_m) in J/m² for 0 ≤ p < p_m.
+    """Return φ(p) = ½ k p²/(1 − p/p_m) in J/m² for 0 ≤ p < p_m, of numbers, arrays or coefficient functions.
 
-    Parameters
-    ----------
-    penetration : number, array or ngsolve.CoefficientFunction
-        p in m.
-    pad : float
-        k in N/m³.
-    stop : float or None
-        p_m in m; None, or infinity, for a pad without a stop.
+    The penetration p and the stop p_m are in m, the pad's k in N/m³; None or infinity is a pad without a stop.
     """
     spring = pad / 2 * penetration**2
     return spring if stop is None else spring / (1 - penetration / stop)
 
 
 def pad_energy(penetration: Any, pad: float, stop: float | None) -> Any:
-    """Return φ(p) in J/m² as an NGSolve coefficient function.
+    """Return φ(p) in J/m² of a penetration p in m as an NGSolve coefficient function, 0 without contact.
 
-    Parameters
-    ----------
-    penetration : ngsolve.CoefficientFunction
-        p in m.
-    pad : float
-        k in N/m³.
-    stop : float or None
-        p_m in m; None for a pad without a stop, which has a limit point.
+    The pad's k is in N/m³, the stop p_m in m; a pad without a stop, None, has a limit point.
     """
     from ngsolve import IfPos
 
@@ -74,27 +56,13 @@ def pad_energy(penetration: Any, pad: float, stop: float | None) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A sphere and the quadrature points of the surface that it may touch.
-
-    Attributes
-    ----------
-    field : Field
-        Displacement of the body.
-    mesh : BodyMesh
-        The body at rest, its nodes those of the field's mesh.
-    surface : str
-        Name of the surface.
-    radius : float
-        R in m.
-    stop : float or None
-        p_m in m; None for a pad without a stop.
-    """
+    """A sphere and the quadrature points of the surface that it may touch."""
 
     field: Field
-    mesh: BodyMesh
+    mesh: BodyMesh  # the body at rest, its nodes those of the field's mesh
     surface: str
-    radius: float
-    stop: float | None
+    radius: float  # R, m
+    stop: float | None  # p_m, m; None for a pad without a stop
 
     def measure(self) -> Any:
         """Return the surface's differential symbol."""

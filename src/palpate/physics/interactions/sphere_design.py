@@ -13,19 +13,13 @@ from palpate.errors import UsageError
 from palpate.format import millimetres
 from palpate.physics.interactions.surface_patch import Patch
 
-__all__ = [
-    "contact_points",
-    "depth_series",
-    "depths_per_series",
-    "group_into_chains",
-    "require_fit",
-]
+__all__ = ["contact_points", "depth_series", "depths_per_series", "group_into_chains", "require_fit"]
 
 LONGEST = 16  # depths in a series: finer ones cost as much as they save
 SAME = 1e-3  # share of the radius within which two contact points are one
 STEEP = 0.95  # share of a step that must lead into the surface
 STRAIGHT = 1 - 1e-9  # cosine from which on two steps are on one line
-NEAR = 8  # scattered points in a chain
+NEAR = 8  # most scattered points in a chain
 UPRIGHT = 1e-6  # by how much a plane's normal may fall short of an axis
 
 
@@ -52,25 +46,13 @@ def contact_points(patch: Patch, centres: np.ndarray) -> tuple[np.ndarray, np.nd
 def group_into_chains(
     centres: np.ndarray, contacts: np.ndarray, distance: np.ndarray, radius: float
 ) -> list[np.ndarray]:
-    """Group positions into chains, each from shallow to deep.
+    """Group positions into chains, each from shallow to deep: int arrays of rows, every row in one of them.
 
-    Positions that follow each other on a straight line into the surface make a chain, and so do those of one
-    contact point. Those that stand alone are split into groups of neighbours, by halving them across their widest
-    side.
+    Positions that follow each other on a straight line into the surface make a chain, and so do those of one contact
+    point. Those that stand alone are split into groups of neighbours, by halving them across their widest side. The
+    chains depend on the positions alone.
 
-    Parameters
-    ----------
-    centres, contacts : (N, 3) array
-        Positions and their contact points in m.
-    distance : (N,) array
-        Signed distances of the centres from the surface in m.
-    radius : float
-        Radius of the sphere in m.
-
-    Returns
-    -------
-    list of int arrays
-        Row indices; every row occurs once. They depend on the positions alone.
+    `centres` and their `contacts` (N, 3) are in m, `distance` (N,) is the signed one from the surface in m.
     """
     runs = _runs(centres, distance)
     whole = [rows for rows in runs if rows.size > 1]
@@ -130,18 +112,8 @@ def require_fit(
 ) -> None:
     """Refuse contact points that reach beyond an upright plane surface, or a depth that is all of the body's thickness.
 
-    Parameters
-    ----------
-    patch : Patch
-        The touched surface.
-    points : (node, 3) array
-        Nodes of the body at rest in m.
-    over : two corners, optional
-        Box in m in which the contact points are to be.
-    deepest : float
-        Largest depth in m.
-    slack : float
-        Distance in m that the box may reach beyond the surface.
+    `points` (node, 3) are the nodes of the body at rest, `over` two corners of the box of the contact points, which may
+    reach beyond the surface by `slack`, and `deepest` is the largest depth, all in m.
     """
     axis = int(np.argmax(np.abs(patch.facing)))
     if not patch.is_plane or abs(patch.facing[axis]) < 1 - UPRIGHT:

@@ -21,17 +21,12 @@ if TYPE_CHECKING:
     from palpate.physics.shapes.meshing import FineMesh
     from palpate.physics.shapes.shape import Geometry
 
-__all__ = [
-    "Patch",
-    "cross",
-    "surface_of",
-    "winding_number",
-]
+__all__ = ["Patch", "cross", "surface_of", "winding_number"]
 
 
 PLANE = 1e-9  # by how much the mean normal of a plane surface may fall short of one
 PARTS = 4  # triangles along an edge: what they still miss is a sixteenth
-SAME = 1e-9  # of the surface's size: points closer than that are one
+SAME = 1e-9  # share of the surface's size: points closer than that are one
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -41,18 +36,10 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Triangles of a surface.
+    """Triangles of a surface."""
 
-    Attributes
-    ----------
-    points : (node, 3) array
-        Positions in m.
-    triangles : (t, 3) int array
-        Nodes, counter-clockwise as seen from outside.
-    """
-
-    points: np.ndarray
-    triangles: np.ndarray
+    points: np.ndarray  # (node, 3) positions, m
+    triangles: np.ndarray  # (t, 3) nodes, counter-clockwise as seen from outside
 
     @classmethod
     def from_mesh(cls, mesh: BodyMesh, surface: str, displacement: np.ndarray | None = None) -> Patch:
@@ -112,21 +99,10 @@ class Patch:
         return projections[nearest], normal, side * float(distances[nearest])
 
     def cast(self, axis: int, sign: float, places: np.ndarray) -> np.ndarray:
-        """Return the outermost points of the surface above places given by their other two coordinates.
+        """Return the outermost points (N, 3) of the surface above `places` (N, 2), the other two coordinates in m.
 
-        Parameters
-        ----------
-        axis : int
-            Coordinate axis along which to look.
-        sign : float
-            Positive where outside is at larger coordinates.
-        places : (N, 2) array
-                Coordinates across the axis in m.
-
-        Returns
-        -------
-        (N, 3) array
-            NaN where there is no surface.
+        The look is along a coordinate axis; `sign` is positive where outside is at larger coordinates. A point is NaN
+        where there is no surface.
         """
         across = [i for i in range(3) if i != axis]
         a, b, c = np.moveaxis(self.corners[:, :, across], 1, 0)
@@ -152,18 +128,10 @@ class Patch:
 
 
 def winding_number(points: np.ndarray, triangles: np.ndarray, place: np.ndarray) -> float:
-    """Return the number of times a closed surface winds around a place: 1 inside, 0 outside.
+    """Return the number of times a closed surface winds around a place (3,) in m: 1 inside, 0 outside.
 
-    By solid angles (Van Oosterom & Strackee 1983).
-
-    Parameters
-    ----------
-    points : (node, 3) array
-        Nodes in m.
-    triangles : (t, 3) int array
-        Nodes of each triangle, counter-clockwise as seen from outside.
-    place : (3,) array
-        Place in m.
+    The triangles (t, 3) of nodes (node, 3) in m are counter-clockwise as seen from outside. The number follows from
+    their solid angles (Van Oosterom & Strackee 1983).
     """
     a, b, c = np.moveaxis(points[triangles] - place, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
@@ -215,13 +183,7 @@ def _edge_weights(corners: np.ndarray, point: np.ndarray, edge: int) -> np.ndarr
 
 
 def surface_of(geometry: Geometry, surface: str, refinements: tuple[FineMesh, ...] = ()) -> Patch:
-    """Return the named surface of a body at rest, its curved elements split into small triangles.
-
-    Raises
-    ------
-    UsageError
-        If the body has no such surface.
-    """
+    """Return the named surface of a body at rest, its curved elements split into small triangles."""
     straight = Patch.from_mesh(geometry.rest(refinements), surface)
     if not getattr(geometry, "curved", False) or straight.is_plane:
         return straight

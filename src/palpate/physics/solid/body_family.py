@@ -34,14 +34,7 @@ if TYPE_CHECKING:
     from palpate.physics.solid.solid_solution import SolidSolution
     from palpate.physics.solid.solid_solver import SolidSolver
 
-__all__ = [
-    "RADIUS",
-    "BodyFamily",
-    "FamilyProblem",
-    "FamilySolver",
-    "Varied",
-    "with_values",
-]
+__all__ = ["RADIUS", "BodyFamily", "FamilyProblem", "FamilySolver", "Varied", "with_values"]
 
 RADIUS = "probe.radius"
 THICKNESS = "thickness"
@@ -396,13 +389,7 @@ class FamilyProblem:
 
 
 class FamilySolver:
-    """The finite elements of the member that was asked last.
-
-    Parameters
-    ----------
-    problem : FamilyProblem
-        The family under interactions.
-    """
+    """The finite elements of that member of a family which was asked last."""
 
     def __init__(self, problem: FamilyProblem) -> None:
         self._problem = problem
@@ -416,13 +403,7 @@ class FamilySolver:
             self._solver.reset()
 
     def solve(self, x: Any) -> SolidSolution:
-        """Find the equilibrium under inputs x (n + k,).
-
-        Raises
-        ------
-        UsageError
-            If `x` has not one finite number per input, or a material does not allow its value.
-        """
+        """Find the equilibrium under inputs x (n + k,): the n interactions' and the k values of the family."""
         x = np.asarray(x, dtype=float)
         n, k = len(self._problem.base.ranges), len(self._problem.varied)
         if x.shape != (n + k,) or not np.isfinite(x).all():

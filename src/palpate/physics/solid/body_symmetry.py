@@ -24,23 +24,15 @@ if TYPE_CHECKING:
 __all__ = ["Symmetry", "fundamental_part", "symmetry_of"]
 
 DIRECTED = (FibreReinforced, UserMaterial)  # have directions of their own, or may have
-LEAST = 1e-6  # of the part's size: rounding
+LEAST = 1e-6  # share of a part's size within which two places are one: rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Symmetry:
-    """A group of isometries about one point.
+    """A group of isometries about one point."""
 
-    Attributes
-    ----------
-    matrices : (k, 3, 3) array
-        Rotations and reflections, the identity among them.
-    about : (3,) array
-        Point in m that stays.
-    """
-
-    matrices: np.ndarray
-    about: np.ndarray
+    matrices: np.ndarray  # (k, 3, 3) rotations and reflections, the identity among them
+    about: np.ndarray  # (3,) point that stays, m
 
     def __len__(self) -> int:
         return len(self.matrices)

@@ -29,9 +29,9 @@ __all__ = ["fit_indentation", "hertz_modulus", "indentation_forces"]
 
 ACROSS = 5  # elements over the radius of the largest contact: the force is then 0.3 % too large
 STIFF = 300.0  # stiffness of the pad over E/((1 − ν²) √(R d)): it takes 0.3 % of the force
-DEPTHS = (0.06, 0.2, 0.42, 0.7, 1.0)  # solved, over the largest
+DEPTHS = (0.06, 0.2, 0.42, 0.7, 1.0)  # depths that are solved, as shares of a record's largest
 HIGHEST = 0.4999  # Poisson's ratio from which on a slab is solved as nearly incompressible
-_FAR = 1e3  # m
+_FAR = 1e3  # m, farther than any slab reaches
 
 
 @dataclass(frozen=True)
@@ -47,25 +47,12 @@ class _QuarterProbe(SphereProbe):
 
 
 def fit_indentation(law: Any, tests: Sequence[Any], poisson: float, confidence: float = 0.95) -> MaterialFit:
-    """Fit the modulus of a law to records of indentation.
+    """Fit the modulus of a law to records of indentation, of any balls and slabs.
 
-    Parameters
-    ----------
-    law : material, ``"neo-hookean"`` or None
-        Law whose moduli are all scaled by one factor; by default neo-Hookean with the given Poisson's ratio.
-    tests : sequence of IndentationTest
-        The records, of any balls and slabs.
-    poisson : float
-        Poisson's ratio of the neo-Hookean law, below 0.5; a law that is given has its own.
-    confidence : float
-        Level of the interval.
-
-    Raises
-    ------
-    UsageError
-        If indentations are mixed with other tests, or the forces are 0 or don't push the ball back.
-    SolverError
-        If the slab can't be solved.
+    All moduli of `law` are scaled by one factor; ``"neo-hookean"`` or None is a neo-Hookean law with the Poisson's
+    ratio that is given, below 0.5, while another law has its own. `confidence` is the level of the interval.
+    Indentations can't be fitted together with other tests, nor where the forces don't push the ball back; a slab that
+    can't be solved is a `SolverError`.
     """
     if not all(isinstance(t, IndentationTest) for t in tests):
         raise UsageError(
@@ -136,15 +123,7 @@ def _result(
 
 
 def hertz_modulus(test: IndentationTest, poisson: float) -> float:
-    """Return Young's modulus in Pa by the theory of small contacts on a bonded layer, a first guess.
-
-    Parameters
-    ----------
-    test : IndentationTest
-        The record.
-    poisson : float
-        Poisson's ratio.
-    """
+    """Return Young's modulus in Pa by the theory of small contacts on a bonded layer, a first guess."""
     chi = np.sqrt(test.radius * test.depth) / test.thickness
     a = -(1.2876 - 1.4678 * poisson + 1.3442 * poisson**2) / (1 - poisson)
     b = (0.6387 - 1.0277 * poisson + 1.5164 * poisson**2) / (1 - poisson)
@@ -158,13 +137,7 @@ def hertz_modulus(test: IndentationTest, poisson: float) -> float:
 
 
 def indentation_forces(material: Any, test: IndentationTest, depths: Sequence[float]) -> np.ndarray:
-    """Return the forces (n,) in N on the ball at rising depths in m, by finite elements.
-
-    Raises
-    ------
-    SolverError
-        If a solve does not converge.
-    """
+    """Return the forces (n,) in N on the ball at rising depths in m, by finite elements."""
     radius, height, deepest = test.radius, test.thickness, max(depths)
     contact = math.sqrt(radius * deepest)
     width = test.width if test.width is not None else max(6 * contact, 3 * height)

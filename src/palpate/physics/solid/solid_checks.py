@@ -47,6 +47,7 @@ FLATTEST = 20.0
 LENGTHS = {"radius": FLATTEST, "depth": 1.0, "stop": 1.0, "displacement": 1.0, "element": 1.0}
 # interactions that push and hold nothing
 PUSHING = (SphereProbe, PointForce, SurfaceTraction, BodyForce, Pressure)
+# members that a geometry and a material must have
 GEOMETRY = ("surfaces", "regions", "mesh", "rest", "describe")
 MATERIAL = ("poisson", "density", "kinematics", "states", "volumetric", "energy", "advance", "describe")
 
@@ -62,13 +63,7 @@ def require_geometry(thing: Any) -> None:
 
 
 def surfaces_of(given: Any, geometry: Any) -> tuple[str, ...]:
-    """Return the names of fixed surfaces, ``"side"`` of a box written out.
-
-    Raises
-    ------
-    UsageError
-        If the geometry does not have one.
-    """
+    """Return the names of fixed surfaces, all known to the geometry, ``"side"`` of a box written out."""
     names = given if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
     surfaces: list[str] = []
     for name in names:
@@ -82,19 +77,7 @@ def by_region(
 ) -> tuple[tuple[str, Any], ...]:
     """Return (region, material) in the order of the regions, from one material for all or one for each.
 
-    Parameters
-    ----------
-    given : Material, or mapping or pairs of (region, Material)
-        One material for all regions, or one for each.
-    regions : tuple of str
-        Names of the body's regions.
-    needed : tuple of str
-        Names of the members that a material must have.
-
-    Raises
-    ------
-    UsageError
-        For an unknown region, one without a material, or what is no material.
+    `needed` are the names of the members that a material must have.
     """
     if isinstance(given, tuple):
         given = dict(given)  # a copy of a body brings its material along as kept
@@ -115,13 +98,7 @@ def by_region(
 
 
 def require_held_values(given: Any) -> tuple[Fixed, ...]:
-    """Return constant interactions, each with its inputs.
-
-    Raises
-    ------
-    UsageError
-        For anything else.
-    """
+    """Return constant interactions, each of them `Fixed` with its inputs."""
     parts = tuple(given) if isinstance(given, tuple | list) else (given,)
     for part in parts:
         if isinstance(part, Fixed):
@@ -196,14 +173,8 @@ def require_lengths(interaction: Any, longest: float) -> None:
 def advise_on_sizes(interaction: Any, element: float | None, longest: float) -> None:
     """Warn of a ball that is larger than the body, and of elements that are larger than the ball.
 
-    Parameters
-    ----------
-    interaction : Interaction
-        What acts; one without a radius passes.
-    element : float or None
-        Element size under it in m; None where the interaction chooses its own.
-    longest : float
-        The body's longest side in m.
+    `element` is the element size under the ball in m, None where the interaction chooses its own; `longest` is the
+    body's longest side in m. An interaction without a radius passes.
     """
     radius = getattr(interaction, "radius", None)
     if radius is None:
@@ -263,13 +234,7 @@ def require_near(points: np.ndarray, ranges: Sequence[Range], longest: float) ->
 
 
 def require_no_loose_part(body: Any, interactions: Sequence[Any]) -> None:
-    """Refuse a body from a file of which a part is held by nothing: no surface of it is fixed, led or glued.
-
-    Raises
-    ------
-    UsageError
-        With the part's place, and the gap to the rest.
-    """
+    """Refuse a body from a file of which a part is held by nothing: no surface of it is fixed, led or glued."""
     geometry = body.geometry
     if not getattr(geometry, "foreign", False):
         return  # palpate's own shapes are of one piece

@@ -124,25 +124,9 @@ def cauchy_stress(field: SolidField, region: str, material: Material, history: H
 class History:
     """The state of a material with a history, at the points at which its energy is integrated.
 
-    Parameters
-    ----------
-    field : SolidField
-        The unknowns of the body.
-    region : str
-        Name of the region.
-    material : Material
-        A law with internal variables.
-    step : ngsolve.Parameter
-        Length of the time step in s.
-
-    Attributes
-    ----------
-    arguments : tuple
-        State and time step, as the material's energy takes them.
-    rules : mapping
-        The quadrature, by element type.
-    stored : ngsolve.CoefficientFunction or None
-        Free energy density in J/m³ with the present state, where the law knows it.
+    `step` is the length of the time step in s, an NGSolve parameter. `arguments` are the state and the time step as the
+    material's energy takes them, `rules` the quadrature by element type, and `stored` is the free energy density in
+    J/m³ with the present state, None where the law does not know it.
     """
 
     def __init__(self, field: SolidField, region: str, material: Material, step: Any) -> None:

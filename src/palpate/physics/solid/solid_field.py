@@ -18,52 +18,28 @@ import numpy as np
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.naming import members, require_known
 
-__all__ = [
-    "CORNERS",
-    "MIDDLES",
-    "MidSides",
-    "SolidField",
-]
+__all__ = ["CORNERS", "MIDDLES", "MidSides", "SolidField"]
 
 CORNERS = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]])  # of NGSolve's tetrahedron
 PAIRS = list(itertools.combinations(range(4), 2))
-MIDDLES = np.array([(CORNERS[i] + CORNERS[j]) / 2 for i, j in PAIRS])  # of its edges
+# middles of its edges, in the order of `PAIRS`
+MIDDLES = np.array([(CORNERS[i] + CORNERS[j]) / 2 for i, j in PAIRS])
 
 
 @dataclass(frozen=True, eq=False)
 class MidSides:
-    """Nodes in the middle of edges.
+    """Nodes in the middle of edges."""
 
-    Attributes
-    ----------
-    edges : (m, 2) int array
-        Vertices that each lies between, the lower number first, in ascending order.
-    points : (m, 3) array
-        Places at rest in m; beside the straight edge where elements are curved.
-    displacement : (m, 3) array
-        In m.
-    """
-
-    edges: np.ndarray
-    points: np.ndarray
-    displacement: np.ndarray
+    edges: np.ndarray  # (m, 2) vertices that each lies between, the lower number first, in ascending order
+    points: np.ndarray  # (m, 3) places at rest in m; beside the straight edge where elements are curved
+    displacement: np.ndarray  # (m, 3) in m
 
 
 class SolidField:
     """Finite-element space of a body, and the state under inspection (an `interactions.Field`).
 
-    Parameters
-    ----------
-    mesh : ngsolve.Mesh
-        Mesh of the body.
-    rest : BodyMesh
-        The same mesh as plain arrays.
-    order : int
-        Polynomial order of the displacement.
-    fixed : sequence of str
-        Surfaces whose displacement is zero.
-    mixed : sequence of str
-        Regions of mixed form.
+    `rest` is the NGSolve mesh `mesh` as plain arrays, `order` the polynomial order of the displacement, which is zero
+    on the surfaces `fixed`; the regions `mixed` have a pressure as well.
     """
 
     def __init__(
@@ -112,13 +88,7 @@ class SolidField:
         self.base.vec.FV().NumPy()[:] = z[: self.motion_size]
 
     def surface(self, name: str) -> Any:
-        """Return the NGSolve region of a named surface.
-
-        Raises
-        ------
-        UsageError
-            If there is none.
-        """
+        """Return the NGSolve region of a named surface."""
         require_known("surface", name, self.rest.surfaces)
         return self.mesh.Boundaries(_pattern(members(name, self.rest.surfaces)))
 

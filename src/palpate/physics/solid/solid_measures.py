@@ -20,17 +20,7 @@ __all__ = ["Measures"]
 
 
 class Measures:
-    """Strains and stresses of the state that a field shows.
-
-    Parameters
-    ----------
-    field : SolidField
-        Unknowns of the body.
-    materials : mapping of str to Material
-        Materials by region.
-    histories : mapping of str to History
-        Internal variables by region, of materials with a history.
-    """
+    """Strains and stresses of the state that a field shows, with materials and internal variables by region."""
 
     def __init__(
         self, field: SolidField, materials: Mapping[str, Material], histories: Mapping[str, History]

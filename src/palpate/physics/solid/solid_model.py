@@ -25,13 +25,7 @@ if TYPE_CHECKING:
     from palpate.physics.solid.solid_body import Body
     from palpate.physics.solid.solid_problem import SolidProblem
 
-__all__ = [
-    "BodyElements",
-    "ConstantInteraction",
-    "OpenProblem",
-    "SolidModel",
-    "open_problem",
-]
+__all__ = ["BodyElements", "ConstantInteraction", "OpenProblem", "SolidModel", "open_problem"]
 
 FLOOR = 1e-14  # J that count as nothing, over shear modulus times volume
 SMALL = 1e-6  # share of the largest energy on the way that still counts
@@ -52,27 +46,9 @@ class ConstantInteraction:
 class BodyElements:
     """Finite elements of a body without interactions: its unknowns, energies, histories and measures.
 
-    Parameters
-    ----------
-    problem : SolidProblem
-        Gives the body, and the places where its mesh is fine.
-    solver : str
-        NGSolve's name of a sparse solver.
-    tolerance : float
-        Relative error in the energy norm at which an iteration ends.
-
-    Attributes
-    ----------
-    field : SolidField
-        The unknowns.
-    histories : mapping of str to History
-        Internal variables by region, of materials with a history.
-    energies : list of Energy
-        Energy of the material of each region.
-    measures : Measures
-        Strains and stresses of the state that the field shows.
-    time_step : ngsolve.Parameter
-        Duration of a load step in s.
+    The problem gives the body, and the places where its mesh is fine; `solver` is NGSolve's name of a sparse solver,
+    `tolerance` the relative error in the energy norm at which an iteration ends. `time_step` is the duration of a load
+    step in s, `histories` are the internal variables by region, of materials with a history.
     """
 
     def __init__(self, problem: SolidProblem, solver: str, tolerance: float) -> None:
@@ -99,21 +75,8 @@ class BodyElements:
 class SolidModel:
     """Π(z; q) of a body: its material, constant interactions and those whose inputs q (n,) vary.
 
-    Parameters
-    ----------
-    elements : BodyElements
-        The body.
-    constants : sequence of ConstantInteraction
-        Interactions whose inputs stay.
-    varied : sequence of Attached
-        Interactions whose inputs vary.
-    base : (dof,) array
-        Unknowns under the constant interactions alone.
-
-    Attributes
-    ----------
-    duration : float
-        Duration of the whole path that is followed, in s.
+    `base` (dof,) are the unknowns under the constant interactions alone; `duration` is that of the whole path that is
+    followed, in s.
     """
 
     def __init__(
@@ -339,28 +302,14 @@ def _length(here: np.ndarray, there: np.ndarray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class OpenProblem:
-    """The finite elements of a problem.
+    """The finite elements of a problem."""
 
-    Attributes
-    ----------
-    model : SolidModel
-        The equations, ready for inputs.
-    settled : PathResult or None
-        Path on which the base state was reached, if the body has constant loads.
-    """
-
-    model: SolidModel
-    settled: PathResult | None
+    model: SolidModel  # ready for inputs
+    settled: PathResult | None  # path to the base state, if the body has constant loads
 
 
 def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> OpenProblem:
-    """Build mesh, spaces, energies and the base state of a problem.
-
-    Raises
-    ------
-    UsageError
-        If a rigid motion of the body is free.
-    """
+    """Build mesh, spaces, energies and the base state of a problem; no rigid motion of its body may be free."""
     elements = BodyElements(problem, solver, tolerance)
     field, body = elements.field, problem.body
     constants = _constants(field, body)

@@ -24,7 +24,7 @@ from palpate.physics.stop import Stop
 __all__ = ["NewtonResult", "Scale", "equilibrate", "error_at"]
 
 ARMIJO = 1e-4  # share of the predicted decrease that a step must bring
-SMALLEST = 2.0**-6
+SMALLEST = 2.0**-6  # shortest step of a line search, as a share of Newton's step
 ROUND_OFF = 1e-6  # below this relative error energy differences drown in round-off
 CHORD = 0.4  # a chord step that leaves more of the error than this is worth less than a new tangent
 CHORDS = 12  # chord steps with one tangent
@@ -59,33 +59,15 @@ def _error(
 
 @dataclass(frozen=True)
 class NewtonResult:
-    """The end of an iteration.
+    """The end of an iteration."""
 
-    Attributes
-    ----------
-    z : (dof,) array
-        The last accepted state.
-    stop : Stop
-        Why it ended.
-    iterations : int
-        Tangents assembled and factorised.
-    error : float
-        Relative error in the energy norm before the last correction.
-    chords : int
-        Steps with a tangent used before.
-    cuts : int
-        Halvings of steps.
-    rejected : (dof,) array or None
-        The last state that the line search refused, to tell why.
-    """
-
-    z: np.ndarray
+    z: np.ndarray  # (dof,) the last accepted state
     stop: Stop
-    iterations: int
-    error: float
-    chords: int = 0
-    cuts: int = 0
-    rejected: np.ndarray | None = None
+    iterations: int  # tangents assembled and factorised
+    error: float  # relative error in the energy norm before the last correction
+    chords: int = 0  # steps with a tangent used before
+    cuts: int = 0  # halvings of steps
+    rejected: np.ndarray | None = None  # (dof,) the last state that the line search refused, to tell why
 
 
 @dataclass
@@ -102,27 +84,11 @@ class _Point:
 def equilibrate(
     system: System, start: np.ndarray, scale: Scale, tolerance: float, limit: int, *, fresh: bool = True
 ) -> NewtonResult:
-    """Find the equilibrium near `start`.
+    """Find the equilibrium near `start` (dof,), whose given unknowns stay as they are.
 
-    Parameters
-    ----------
-    system : System
-        The equations.
-    start : (dof,) array
-        State to begin from; its given unknowns stay as they are.
-    scale : Scale
-        Scale of energies.
-    tolerance : float
-        Relative error in the energy norm; the correction then at hand is still made.
-    limit : int
-        Largest number of factorisations.
-    fresh : bool
-        True to begin with a new tangent, False to try the present one first.
-
-    Returns
-    -------
-    NewtonResult
-        Never raises for want of convergence: `stop` says how it ended.
+    `tolerance` is the relative error in the energy norm; the correction then at hand is still made. `limit` is the
+    largest number of factorisations. The iteration begins with a new tangent if `fresh`, else it tries the present one
+    first. It never raises for want of convergence: `NewtonResult.stop` says how it ended.
     """
     return _Iteration(system, scale, tolerance).run(start, limit, fresh=fresh)
 

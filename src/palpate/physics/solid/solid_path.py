@@ -29,23 +29,16 @@ if TYPE_CHECKING:
     from palpate.physics.solid.solid_model import SolidModel
     from palpate.physics.solid.solid_newton import NewtonResult
 
-__all__ = [
-    "LoadStep",
-    "PathPoint",
-    "PathResult",
-    "StepResult",
-    "follow",
-    "predict",
-    "take_step",
-]
+__all__ = ["LoadStep", "PathPoint", "PathResult", "StepResult", "follow", "predict", "take_step"]
 
 STRAIGHT = 0.999  # cosine from which on two steps are on one line
-SMALLEST_STEP = 2.0**-10  # of the whole path
-# Where equilibria are found but lie beyond a law's reach, shorter steps find them too
+SMALLEST_STEP = 2.0**-10  # shortest step, as a share of the whole path
+# The same where equilibria are found but lie beyond a law's reach: shorter steps find such ones too
 SMALLEST_REFUSED = 2.0**-4
-# Where a step errs too much in time: the first moments of a long creep may be short
+# The same where a step errs too much in time: the first moments of a long creep may be short
 SMALLEST_IN_TIME = 2.0**-30
-# Of steps that led nowhere, and of all where nothing is remembered: bounds the time that pointless inputs cost
+# Newton iterations of steps that led nowhere, or of all steps of a body without a history: bounds the time that
+# pointless inputs cost
 MOST_ITERATIONS = 200
 # Tries in a row that led nowhere, and the CPU time in s that they took, from which on a path is given up: so many
 # halvings of a step are hardly ever followed by one that succeeds, and small bodies try them all within that time
@@ -61,24 +54,12 @@ logger = logging.getLogger("palpate.physics.solid")  # progress, for those who a
 
 @dataclass(frozen=True)
 class PathPoint:
-    """An equilibrium on a path.
+    """An equilibrium on a path."""
 
-    Attributes
-    ----------
-    q : (n,) array
-        Its inputs.
-    z : (dof,) array
-        Its unknowns.
-    slope : (n, dof) array or None
-        About ∂z/∂q; None where it is not known yet.
-    previous : PathPoint or None
-        The equilibrium from which it was reached.
-    """
-
-    q: np.ndarray
-    z: np.ndarray
-    slope: np.ndarray | None = None
-    previous: PathPoint | None = None
+    q: np.ndarray  # (n,) inputs
+    z: np.ndarray  # (dof,) unknowns
+    slope: np.ndarray | None = None  # (n, dof) about ∂z/∂q; None where it is not known yet
+    previous: PathPoint | None = None  # equilibrium from which it was reached
 
     def without_previous(self) -> PathPoint:
         """Return the equilibrium without the one before it, so that chains don't pile up in memory."""
@@ -147,24 +128,12 @@ def _bend(here: PathPoint, ahead: np.ndarray) -> np.ndarray | None:
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """The result of one tried step.
+    """The result of one tried step."""
 
-    Attributes
-    ----------
-    z : (dof,) array
-        Unknowns at its end.
-    verdict : Verdict
-        Whether its end is admissible, and why not.
-    searches : tuple of NewtonResult
-        The searches that it took: one, or those of the whole step and its halves.
-    error : float
-        Error in time over the tolerated one.
-    """
-
-    z: np.ndarray
-    verdict: Verdict
-    searches: tuple[NewtonResult, ...]
-    error: float = 0.0
+    z: np.ndarray  # (dof,) unknowns at its end
+    verdict: Verdict  # whether its end is admissible, and why not
+    searches: tuple[NewtonResult, ...]  # one, or those of the whole step and its halves
+    error: float = 0.0  # error in time over the tolerated one
 
     @property
     def good(self) -> bool:
@@ -210,36 +179,16 @@ def _verdict(model: SolidModel, end: NewtonResult, q: np.ndarray) -> Verdict:
 
 @dataclass(frozen=True)
 class LoadStep:
-    """One tried step along a path.
+    """One tried step along a path."""
 
-    Attributes
-    ----------
-    position : float
-        Share of the path at its end.
-    step : float
-        Its length as a share of the path.
-    stop : Stop
-        Why its search ended; the step counts only if it converged.
-    iterations : int
-        Newton iterations: tangents assembled and factorised.
-    chords : int
-        Cheap steps with a tangent used before.
-    residual : float
-        √(|rᵀK⁻¹r|/energy) before the last correction.
-    cuts : int
-        Halvings in the line search.
-    error : float
-        Error in time over the tolerated one: a step counts only if it is at most 1. 0 without a history.
-    """
-
-    position: float
-    step: float
-    stop: Stop
-    iterations: int
-    chords: int
-    residual: float
-    cuts: int
-    error: float = 0.0
+    position: float  # share of the path at its end
+    step: float  # its length as a share of the path
+    stop: Stop  # why its search ended; the step counts only if it converged
+    iterations: int  # tangents assembled and factorised
+    chords: int  # cheap steps with a tangent used before
+    residual: float  # √(|rᵀK⁻¹r|/energy) before the last correction
+    cuts: int  # halvings in the line search
+    error: float = 0.0  # error in time over the tolerated one: the step counts up to 1; 0 without a history
 
     def __str__(self) -> str:
         failed = "" if self.stop is Stop.CONVERGED else f", cut back: {self.stop}"
@@ -271,22 +220,9 @@ class PathResult:
 def follow(model: SolidModel, start: PathPoint, target: np.ndarray) -> PathResult:
     """Follow the equilibrium from `start` along a straight line of inputs to `target` (n,).
 
-    Internal variables are taken over after each step but the last: what belongs to the last one can then still be
-    asked of the model.
-
-    Parameters
-    ----------
-    model : SolidModel
-        Equations of the body; afterwards they are at the end of the path.
-    start : PathPoint
-        Equilibrium at the beginning of the path.
-    target : (n,) array
-        Inputs at its end.
-
-    Returns
-    -------
-    PathResult
-        With `Stop.CONVERGED` where it arrived, else with the reason and the last equilibrium before it.
+    Internal variables are taken over after each step but the last: what belongs to the last one can then still be asked
+    of the model, whose equations are at the end of the path. The result has `Stop.CONVERGED` where the path arrived,
+    else the reason and the last equilibrium before it.
     """
     here, position, log = _with_slope(model, start), 0.0, list[LoadStep]()
     watch = _Watch()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SolidSolution"]
 
-ROUNDING = 1e-9  # of a range's ends
+ROUNDING = 1e-9  # share of a range's ends by which rounding may carry an input beyond it
 
 
 @dataclass(frozen=True, eq=False, repr=False)

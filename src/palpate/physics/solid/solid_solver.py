@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SolidSolver", "step_lengths"]
 
-EQUILIBRIA = 64  # that are kept to start from
+EQUILIBRIA = 64  # most equilibria that are kept for later solves to start from
 EXAMPLE = "For example march(times=[0.1, 0.2], inputs=[[0.05, 0.05, 0.058], [0.05, 0.05, 0.056]])."
 
 logger = logging.getLogger("palpate.physics.solid")
@@ -33,24 +33,12 @@ logger = logging.getLogger("palpate.physics.solid")
 class SolidSolver:
     """Finite elements of one problem, kept open between solves.
 
-    Progress is logged: ``logging.basicConfig(level="INFO")`` shows each load step as it ends.
+    Each solve starts from the kept equilibrium that is nearest to its inputs, or from outside along the approach path
+    of its interactions, whichever is nearer. A body with a history starts from its last equilibrium.
 
-    Each solve starts from the kept equilibrium that is nearest to its inputs, or from outside along the approach
-    path of its interactions, whichever is nearer. A body with a history starts from its last equilibrium.
-
-    Parameters
-    ----------
-    problem : SolidProblem
-        The body and its interactions.
-    solver : str
-        ``"auto"``, or NGSolve's name of a sparse solver.
-    tolerance : float
-        Relative error in the energy norm at which an iteration ends.
-
-    Raises
-    ------
-    SolverError
-        If the body has no equilibrium under its constant loads.
+    `solver` is ``"auto"`` or NGSolve's name of a sparse solver, `tolerance` the relative error in the energy norm at
+    which an iteration ends. A body without an equilibrium under its constant loads is a `SolverError`. Progress is
+    logged: ``logging.basicConfig(level="INFO")`` shows each load step as it ends.
     """
 
     def __init__(self, problem: SolidProblem, *, solver: str = "auto", tolerance: float = 1e-9) -> None:
@@ -81,29 +69,15 @@ class SolidSolver:
         self._model.restore(self._settled)
 
     def solve(self, x: Any, *, dt: float | None = None, fields: bool = False) -> SolidSolution:
-        """Find the equilibrium under inputs x (n,).
+        """Find the equilibrium under inputs x (n,), one number per input in SI units.
 
-        Parameters
-        ----------
-        x : (n,) array
-            One number per input, in SI units.
-        dt : float, optional
-            Only for materials with a history: the solve goes on from the last equilibrium by a step of this many
-            seconds. Without it, such a body is loaded from rest, in an instant, along the approach path, and what it
-            remembers of other solves is left as it was.
-        fields : bool
-            True for stress and stretch at the nodes; a problem with `stress` always does.
+        `dt` in s is only for materials with a history: the solve goes on from the last equilibrium by a step of that
+        length. Without it, such a body is loaded from rest, in an instant, along the approach path, and what it
+        remembers of other solves is left as it was. With `fields` there are stress and stretch at the nodes, as always
+        for a problem with `stress`.
 
-        Returns
-        -------
-        SolidSolution
-            `SolidSolution.converged` is true where there is one; `SolidSolution.message` says why not. After a failed
-            step the body's history is what it was before.
-
-        Raises
-        ------
-        UsageError
-            If `x` has not one finite number per input, `dt` is not positive or the body has no history.
+        `SolidSolution.converged` is true where there is an equilibrium; `SolidSolution.message` says why not. After a
+        failed step the body's history is what it was before.
         """
         q = self._problem.inputs(x)
         outside = self._model.approach(q)
@@ -132,27 +106,10 @@ class SolidSolver:
             )
 
     def march(self, times: Any, inputs: Any, *, fields: bool = False) -> list[SolidSolution]:
-        """Solve for inputs that follow each other in time, from where the body is.
+        """Solve for inputs (m, n) that follow each other in time, from where a body with a history is, at time 0.
 
-        Parameters
-        ----------
-        times : (m,) array
-            Ends of the steps in s, ascending from above 0: the body is at time 0.
-        inputs : (m, n) array
-            One row of inputs for each time.
-        fields : bool
-            True for stress and stretch at the nodes.
-
-        Returns
-        -------
-        list of SolidSolution
-            One for each time, up to the first that failed.
-
-        Raises
-        ------
-        UsageError
-            If the times don't ascend from above 0, there is not one row of inputs for each, or the body has no
-            history.
+        The times (m,) are the ends of the steps in s, ascending from above 0. With `fields` there are stress and
+        stretch at the nodes. The solutions, one for each time, end with the first that failed.
         """
         inputs = np.atleast_2d(inputs)
         solutions: list[SolidSolution] = []
@@ -338,20 +295,7 @@ class _SolutionBuilder:
 
 
 def step_lengths(times: Any, rows: int) -> list[float]:
-    """Return the lengths of the steps in s that end at these times, the first from time 0.
-
-    Parameters
-    ----------
-    times : (m,) array
-        Ends of the steps in s.
-    rows : int
-        Number of rows of inputs.
-
-    Raises
-    ------
-    UsageError
-        If they are no numbers, not as many as the rows, or don't ascend from above 0.
-    """
+    """Return the lengths of the steps in s that end at these ascending times, one per row, the first from time 0."""
     try:
         given = np.atleast_1d(np.asarray(times, dtype=float))
     except (TypeError, ValueError):

@@ -25,13 +25,7 @@ from palpate.errors import UsageError
 from palpate.physics.interactions.interaction import BEYOND, Attached, Energy
 from palpate.physics.solid.solid_field import SolidField
 
-__all__ = [
-    "Inputs",
-    "System",
-    "is_accurate",
-    "is_stable",
-    "sparse_solver",
-]
+__all__ = ["Inputs", "System", "is_accurate", "is_stable", "sparse_solver"]
 
 STEPS = 6  # Lanczos steps: each costs a back-substitution
 ACCURATE = 1e-6  # relative residual of a back-substitution
@@ -39,18 +33,9 @@ SOLVERS = ("auto", "sparsecholesky", "pardiso", "umfpack")
 
 
 class System:
-    """Π(z) and its derivatives on the free unknowns.
+    """Π(z) and its derivatives on the unknowns that are `free` (dof,); the others are given.
 
-    Parameters
-    ----------
-    field : SolidField
-        The unknowns.
-    energies : sequence of Energy
-        Terms of ∫ φ.
-    free : (dof,) bool array
-        True for unknowns that are solved for; the others are given.
-    solver : str
-        NGSolve's name of a sparse solver.
+    The energies are terms of ∫ φ, `solver` is NGSolve's name of a sparse solver.
     """
 
     def __init__(self, field: SolidField, energies: Sequence[Energy], free: np.ndarray, solver: str) -> None:
@@ -109,18 +94,10 @@ class System:
 
 
 def sparse_solver(name: str = "auto") -> str:
-    """Return NGSolve's name of the sparse solver to use.
+    """Return NGSolve's name of the sparse solver to use, one of `SOLVERS`.
 
-    Parameters
-    ----------
-    name : {"auto", "sparsecholesky", "pardiso", "umfpack"}
-        ``"auto"`` takes NGSolve's own Cholesky factorisation. MKL's PARDISO, where the package `mkl` is installed, is
-        to be asked for: it was slower on one thread, and what is installed must not change an answer's last digits.
-
-    Raises
-    ------
-    UsageError
-        For another name, or PARDISO where it is not installed.
+    ``"auto"`` takes NGSolve's own Cholesky factorisation. MKL's PARDISO, where the package `mkl` is installed, is to be
+    asked for: it was slower on one thread, and what is installed must not change an answer's last digits.
     """
     from ngsolve.la import BaseMatrix
 
@@ -180,15 +157,7 @@ def _start(system: System) -> np.ndarray:
 
 
 class Inputs:
-    """The n inputs of all interactions of a problem, and derivatives of the potential in them.
-
-    Parameters
-    ----------
-    field : SolidField
-        The unknowns.
-    attached : sequence of Attached
-        Interactions whose inputs these are, in their order.
-    """
+    """The n inputs of all attached interactions, in their order, and derivatives of the potential in them."""
 
     def __init__(self, field: SolidField, attached: Sequence[Attached]) -> None:
         self._field = field

@@ -75,9 +75,7 @@ def _closing(client: distributed.Client) -> Iterator[distributed.Client]:
         yield client
     finally:
         connected = client.status == "running"
-        logger = logging.getLogger(
-            "distributed.client"
-        )  # it tells of the end of its attempts to connect again
+        logger = logging.getLogger("distributed.client")  # tells of the end of attempts to connect again
         level = logger.level
         logger.setLevel(level if connected else logging.CRITICAL)
         try:
@@ -85,6 +83,7 @@ def _closing(client: distributed.Client) -> Iterator[distributed.Client]:
         except (OSError, ValueError):
             if connected:
                 raise
+            client.status = "closed"  # or it closes again when it is collected, and fails aloud
         finally:
             logger.setLevel(level)
 
@@ -100,10 +99,7 @@ def _client(cluster: Any) -> distributed.Client:
 
     try:
         return distributed.Client(address, security=security, set_as_default=False)
-    except (
-        OSError,
-        ValueError,
-    ) as error:  # a time-out is one of the first; an address that is none, of the second
+    except (OSError, ValueError) as error:  # a time-out is one of the first; a wrong address, of the second
         raise ResourceError(
             f"No scheduler answers at {address}.",
             why=f"{type(error).__name__}: {error}",

@@ -59,13 +59,7 @@ def pack(table: np.ndarray) -> np.ndarray:
 
 
 def unpack(packed: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the array of float64 of a known shape, bit for bit what was packed.
-
-    Raises
-    ------
-    ValueError
-        If the bytes are not those of such an array.
-    """
+    """Return the array of float64 of a known shape, bit for bit what was packed; other bytes raise a ValueError."""
     data = packed.tobytes()
     if data[:1] != bytes([_MARK]):
         return _inflate(data, shape, "<f8").astype(np.float64)

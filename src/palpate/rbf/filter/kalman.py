@@ -91,22 +91,11 @@ def kalman_update(
     refuses: Callable[[np.ndarray], bool] | None = None,
     donate: bool = False,
 ) -> State:
-    """Return the state after one observation.
+    """Return the state after one observation of values, slopes and curvatures of the map at one place.
 
-    Parameters
-    ----------
-    state : State
-        Before it.
-    observation : Observation
-        Values, slopes and curvatures of the map at one place.
-    prediction : (q,), (q, d)
-        The state's own measurement there and its derivatives by z.
-    settings : Settings
-        Noise, step bound, iterations and forgetting of the update.
-    refuses : callable, optional
-        Says of parameters z (d,) that they may not be taken; by default the remembered observations decide.
-    donate : bool
-        Whether the old covariance may be overwritten.
+    The prediction is the state's own measurement there (q,) and its derivatives (q, d) by z. `refuses` says of
+    parameters z (d,) that they may not be taken; by default the remembered observations decide. With `donate` the old
+    covariance may be overwritten. Of the settings, noise, step bound, iterations and forgetting count.
     """
     if refuses is None:
 

@@ -66,24 +66,12 @@ class DampedSystem:
 
 @dataclass(frozen=True, eq=False)
 class LevenbergStep:
-    """Outcome of one iteration.
+    """Outcome of one iteration."""
 
-    Attributes
-    ----------
-    theta : (h, p)
-        Units; where they started if no damping helped.
-    fit : Fit
-        The best weights and tail for them.
-    damping : float
-        To begin the next iteration with.
-    gain : float
-        By how much the cost fell through the units' move.
-    """
-
-    theta: np.ndarray
-    fit: Fit
-    damping: float
-    gain: float
+    theta: np.ndarray  # (h, p), units; where they started if no damping helped
+    fit: Fit  # the best weights and tail for them
+    damping: float  # the next iteration begins with it
+    gain: float  # by how much the cost fell through the units' move
 
 
 def damped_step(

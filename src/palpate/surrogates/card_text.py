@@ -45,16 +45,9 @@ _MOST = 12  # values of a list that are shown
 
 
 def bullets(part: Mapping[str, Any], escape: Callable[[str], str] = str, depth: int = 0) -> list[str]:
-    """Return a nested record as nested Markdown bullets; what is empty is left out.
+    """Return a record of names and JSON values as nested Markdown bullets; what is empty is left out.
 
-    Parameters
-    ----------
-    part : mapping
-        Names and values as JSON knows them.
-    escape : callable
-        Applied to each text of the record.
-    depth : int
-        How far the bullets are indented.
+    `escape` is applied to each text of the record.
     """
     lines: list[str] = []
     for name, value in part.items():

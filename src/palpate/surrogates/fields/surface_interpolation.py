@@ -21,18 +21,10 @@ RIDGE = 1e-10  # of the system: where nodes coincide or lie on a conic in the ta
 
 @dataclass(frozen=True, eq=False)
 class SurfaceInterpolation:
-    """Carries values from P nodes to Q places.
+    """Interpolation weights that carry values from P nodes to Q places."""
 
-    Attributes
-    ----------
-    nodes : (Q, k) array of int
-        Nodes that each place takes its value from.
-    weights : (Q, k) array
-        Share of each of them; a row adds up to one.
-    """
-
-    nodes: np.ndarray
-    weights: np.ndarray
+    nodes: np.ndarray  # (Q, k) int, nodes that each place takes its value from
+    weights: np.ndarray  # (Q, k), share of each of them; a row adds up to one
 
     @classmethod
     def of(

@@ -46,29 +46,18 @@ PLANE = 1e-9  # of its size: how far a flat surface may lie off its plane
 
 @dataclass(frozen=True, eq=False)
 class DistanceTable:
-    """A sampled field, as `palpate.surrogates.surface.distance_kernels` takes it.
+    """A sampled field, as `palpate.surrogates.surface.distance_kernels` takes it."""
 
-    Attributes
-    ----------
-    frame, coefficients, profile : arrays
-        Grid and spline coefficients, and the profile of a flat surface.
-    error : float
-        Largest deviation from the measured distance at check points, in m.
-    """
-
-    frame: np.ndarray
-    coefficients: np.ndarray
-    profile: np.ndarray
-    error: float
+    frame: np.ndarray  # numbers of the grid
+    coefficients: np.ndarray  # spline coefficients on the grid
+    profile: np.ndarray  # profile of a flat surface
+    error: float  # largest deviation from the measured distance at check points, m
 
 
 def tabulate(measured: MeasuredDistance, reach: float, inner: float, spacing: float | None) -> DistanceTable:
     """Return the field out to a reach and in to an inner reach (m), by a spacing (m) or the coarsest that is true.
 
-    Raises
-    ------
-    UsageError
-        If the spacing is too coarse for the probe, or the grid would be too large.
+    A spacing too coarse for the probe is refused, and so is a grid that would be too large.
     """
     ends = measured.patches.kinds.any()
     flat = _is_flat(measured)

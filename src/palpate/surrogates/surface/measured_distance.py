@@ -68,27 +68,13 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 @dataclass(frozen=True, eq=False)
 class MeasuredDistance:
-    """Measures distances to a surface.
+    """The distance to a surface, measured on its patches."""
 
-    Attributes
-    ----------
-    patches : Patches
-        In the order of `discs`.
-    discs : (n, 8) array
-        Their tree.
-    radius : float
-        R in m: of the smallest probe.
-    shoulder : float
-        ρ in m; 0 for none.
-    behind : float
-        In m; infinite where d shall fall on.
-    """
-
-    patches: Patches
-    discs: np.ndarray
-    radius: float
-    shoulder: float = 0.0
-    behind: float = np.inf
+    patches: Patches  # small triangles in the order of `discs`
+    discs: np.ndarray  # (n, 8), tree of the patches
+    radius: float  # R of the smallest probe, m
+    shoulder: float = 0.0  # ρ at the border, m; 0 for none
+    behind: float = np.inf  # distance inside from which d turns back, m; infinite where it falls on
 
     @classmethod
     def of(

@@ -47,9 +47,8 @@ class RoundedModes:
         rows = np.concatenate([shown.rest[None], shown.modes])
         size = np.abs(rows).reshape(len(rows), -1)
         largest = size.max(axis=1, initial=0.0)
-        exact = ((size == 0.0) | (size == largest[:, None])).all(
-            axis=1
-        )  # none, or 1 everywhere as a stretch at rest
+        # a mode of zeros, or of one number everywhere, as a stretch at rest
+        exact = ((size == 0.0) | (size == largest[:, None])).all(axis=1)
         finest, X = largest / _LARGEST, _all_touches(surrogate, shown)
         share = np.hstack([np.ones((len(X), 1)), np.abs(shown.coefficients(X))]) * ~exact
         most = np.maximum(share.max(axis=0, initial=0.0), 1e-300)

@@ -336,9 +336,8 @@ def _answers(
     shapes = {"stiffness": (3, 3), "force": (3,), "slope": (3,)}
     for name, out in (outputs | {"depth": depth}).items():
         shown = finite.spread(2) if name == "stiffness" else finite
-        otherwise = (
-            0.0 if name in {"force", "stiffness"} else math.nan
-        )  # nobody is pushed by what is no number
+        # what is not a number must not push anybody
+        otherwise = 0.0 if name in {"force", "stiffness"} else math.nan
         graph.output(name, graph.where(shown, out, otherwise), shapes.get(name, (1,)))
     graph.output("inside", inside & finite, (1,), np.bool_)
 

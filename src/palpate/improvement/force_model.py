@@ -15,12 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.improvement.gradient_process import (
-    GradientProcess,
-    Observations,
-    fit_process,
-    no_symmetry,
-)
+from palpate.improvement.gradient_process import GradientProcess, Observations, fit_process, no_symmetry
 from palpate.learning.energy import EnergySamples
 from palpate.learning.energy.energy_images import images_of
 from palpate.rbf.symmetric_units import Images

@@ -294,9 +294,8 @@ class _Improvement:
     def _reason(self) -> str:
         if self._is_complete or self.errors[-1] > self.stop.until:
             pass
-        elif (
-            len(self.errors) == 1
-        ):  # a surrogate of an earlier run: all unseen solves judge it before anything else
+        elif len(self.errors) == 1:
+            # a surrogate of an earlier run: all unseen solves judge it before anything else
             self._judge_by(len(self.unseen))
             self.error = self.errors[-1] = self._error(self.best)
         return self.stop.reason(

@@ -69,9 +69,8 @@ def unpack(packed: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     whole = ((folded >> 1) & np.int32(2**31 - 1)) ^ -(folded & 1)
     for axis in reversed(range(len(shape))):
         whole = np.cumsum(whole, axis=axis, dtype=np.int32)
-    with np.errstate(
-        over="ignore"
-    ):  # what is too large becomes infinite, for the reader of the table to refuse
+    # a number that is too large becomes infinite, for the reader of the table to refuse
+    with np.errstate(over="ignore"):
         return np.asarray(np.ldexp(whole.astype(np.float64), _HEAD.unpack_from(data)[1]))
 
 

@@ -20,13 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = [
-    "Block",
-    "attach",
-    "create",
-    "folder",
-    "remove",
-]
+__all__ = ["Block", "attach", "create", "folder", "remove"]
 
 _RAM = Path("/dev/shm")
 

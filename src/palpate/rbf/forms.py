@@ -20,14 +20,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = [
-    "Centred",
-    "Form",
-    "Oblique",
-    "Widths",
-    "chain_of",
-    "unit_form",
-]
+__all__ = ["Centred", "Form", "Oblique", "Widths", "chain_of", "unit_form"]
 
 Widths = Literal["log", "plain"]
 

@@ -26,19 +26,10 @@ from numba import njit
 
 from palpate.errors import UsageError
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction, radial, third
-from palpate.rbf.derivative_kernels import (
-    Derivatives,
-    Pattern,
-    curvatures_by_factors,
-    slopes_by_factors,
-)
+from palpate.rbf.derivative_kernels import Derivatives, Pattern, curvatures_by_factors, slopes_by_factors
 from palpate.rbf.forms import Form, chain_of
 
-__all__ = [
-    "Regressors",
-    "Tail",
-    "pairs",
-]
+__all__ = ["Regressors", "Tail", "pairs"]
 
 Tail = Literal["affine", "constant", "none"]
 

@@ -12,13 +12,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.tables import numbers_of
 
-__all__ = [
-    "numbers",
-    "relative_error",
-    "samples",
-    "second_derivatives",
-    "spread_of",
-]
+__all__ = ["numbers", "relative_error", "samples", "second_derivatives", "spread_of"]
 
 
 def numbers(what: str, given: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> np.ndarray:

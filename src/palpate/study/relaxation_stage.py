@@ -72,9 +72,8 @@ def with_relaxation(
     learnt, unseen = records[: len(DEPTHS)], records[-1]
     most = min(MOST, len(times))
     found = identify_behind_pad(learnt, most=most)
-    if sum(found.relaxation.shares) > MORE * _largest_share(
-        study
-    ):  # the pad's part is not told by these presses
+    if sum(found.relaxation.shares) > MORE * _largest_share(study):
+        # these presses do not tell the part of the pad
         found = identify(learnt[-1], most=most)
     error = _error_on(unseen, found.relaxation)
     log(f"{found}; missed by {share(error)} at a depth that it was not fitted to")

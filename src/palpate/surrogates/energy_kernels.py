@@ -74,9 +74,8 @@ _SLACK = 1e-9  # of a range: round-off at its edge is still inside
 # places in `small`: ∇²U₀, ∇²ℓ, and two matrices and ∇²d for a baseline; then vectors as rows
 HESSIAN, LOG, BEND, OTHER, SURFACE, VECTORS, MORE, ROOT = range(8)
 SMALL = 8
-GRADIENT, _SLOPE, OUTWARD = range(
-    3
-)  # rows of small[VECTORS]: ∇U₀, ∇ℓ, and the outer normal of a touched surface
+# rows of small[VECTORS]: ∇U₀, ∇ℓ, and the outer normal of a touched surface
+GRADIENT, _SLOPE, OUTWARD = range(3)
 _LAST = 2  # row of small[MORE]: the trained point last near; the others are a baseline's scratch
 # first row of small[ROOT]: ∇s₀, s₀ the signed root of 2 U₀
 

@@ -29,13 +29,7 @@ from typing import BinaryIO
 from palpate.dataset.measured.measured_columns import Columns, Measurements
 from palpate.errors import UsageError
 
-__all__ = [
-    "VERSION",
-    "Connection",
-    "greeting",
-    "lines_of",
-    "measurements",
-]
+__all__ = ["VERSION", "Connection", "greeting", "lines_of", "measurements"]
 
 VERSION = "1"
 _DEFAULT = "t,x,y,z,fx,fy,fz"

@@ -39,10 +39,7 @@ from palpate.rbf.refinement.rows import Rows
 from palpate.rbf.regressors import Regressors
 from palpate.rbf.sample_checks import numbers, samples
 
-__all__ = [
-    "Posterior",
-    "posterior",
-]
+__all__ = ["Posterior", "posterior"]
 
 
 def _inverse(information: np.ndarray) -> np.ndarray:

@@ -47,14 +47,7 @@ from palpate.surrogates.surface.curved_patches import SHARP, SMOOTH, Patches, pa
 from palpate.surrogates.surface.nearest_triangle import DEEP, disc_tree, nearest_into
 from palpate.surrogates.surface.oriented_mesh import OrientedMesh
 
-__all__ = [
-    "BEHIND",
-    "BRIDGED",
-    "PLAIN",
-    "ROLLED",
-    "ROUNDED",
-    "MeasuredDistance",
-]
+__all__ = ["BEHIND", "BRIDGED", "PLAIN", "ROLLED", "ROUNDED", "MeasuredDistance"]
 
 # the contact point lies on a smooth piece, on a line, or on a border with a shoulder; below the border; behind the body
 PLAIN, ROUNDED, ROLLED, BRIDGED, BEHIND = 0, 1, 2, 3, 4

@@ -16,12 +16,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = [
-    "CREASE",
-    "Corners",
-    "OrientedMesh",
-    "corners_of",
-]
+__all__ = ["CREASE", "Corners", "OrientedMesh", "corners_of"]
 
 CREASE = np.cos(np.radians(40.0))  # facets that turn by more meet in an edge of the body, not in a mesh's
 FLAT = 1e-7  # height of a triangle by its longest edge, below which it has no normal

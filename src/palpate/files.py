@@ -42,7 +42,7 @@ _PREFIX, _LOCK = "palpate-", "in-use" if os.name != "nt" else "lock"
 _SYNCHRONISED_AT_ONCE = 16  # files: a disk takes many in little more than the time of one
 # pattern of the marks of unfinished files; s after which nobody writes them
 _MARK, _ABANDONED = "?" * 8, 3600.0
-_HALF_DONE = 0.2  # s between two renames, at most
+_HALF_DONE = 0.2  # s between the two renames that replace a folder, at most
 _WRONG_PATH = {
     errno.ENOENT,
     errno.EEXIST,

@@ -24,8 +24,8 @@ from palpate.surrogates.energy import LearntEnergy
 
 __all__ = ["BODY_OUTPUTS", "add_body"]
 
-SLACK = 1e-9  # of a range: round-off at its edge is still inside, as in the compiled kernels
-STEP = 1e-3  # of the probe's radius: the difference that finds the third derivative of the distance
+SLACK = 1e-9  # share of a range: round-off at its edge is still inside, as in the compiled kernels
+STEP = 1e-3  # step over the probe's radius, of the difference for the third derivative of the distance
 BODY_OUTPUTS = ("energy", "force", "stiffness", "amplitude", "slope", "depth", "inside", "deviation")
 
 

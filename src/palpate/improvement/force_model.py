@@ -24,8 +24,8 @@ from palpate.units import Range, bounds
 
 __all__ = ["ForceModel"]
 
-LIGHT = 0.05  # of the largest force: f₀
-_CLIP = 30.0  # of ℓ: far from data an exponential must not overflow
+LIGHT = 0.05  # f₀ over the largest force
+_CLIP = 30.0  # largest |ℓ|: far from data an exponential must not overflow
 
 
 @dataclass(frozen=True, eq=False)

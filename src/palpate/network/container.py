@@ -33,7 +33,7 @@ __all__ = ["MAKE_ANEW", "Container", "read_container", "write_container"]
 
 VERSION = 2
 MAKE_ANEW = "Copy the file again, or make it anew with `palpate learn`."
-_HEADER_MAX = 100_000_000  # bytes, of safetensors
+_HEADER_MAX = 100_000_000  # bytes of a header, as safetensors allows
 _KINDS = {"BOOL", "U8", "I8", "U16", "I16", "U32", "I32", "U64", "I64", "F16", "F32", "F64"}
 
 

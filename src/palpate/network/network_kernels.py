@@ -108,7 +108,7 @@ def workspace(parts: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:
 
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
-_SMALL = 8  # outputs: fewer are summed in registers, more along the rows
+_SMALL = 8  # number of outputs: fewer are summed in registers, more along the rows
 
 
 @_jit

@@ -16,12 +16,12 @@ from palpate.sizes import require_deflated
 
 __all__ = ["pack", "unpack", "whole_multiples"]
 
-LEVEL = 1  # of zlib: the fastest; higher ones gain a few percent
-WHOLE_LEVEL = 6  # the same of whole numbers, which are a third as many bytes
-BITS = 31  # of a whole number
-_HEAD = struct.Struct("<Bh")  # of whole multiples: the mark and the exponent
-_MARK = 1
-_FEW = 1000  # numbers that tell most tables from multiples
+LEVEL = 1  # level of zlib: the fastest; higher ones gain a few percent
+WHOLE_LEVEL = 6  # level of zlib for whole numbers, which are a third as many bytes
+BITS = 31  # bits of a whole number
+_HEAD = struct.Struct("<Bh")  # head of a table of whole multiples: the mark and the exponent
+_MARK = 1  # first byte of a table of whole multiples
+_FEW = 1000  # numbers that tell most tables from those of multiples
 
 
 def whole_multiples(table: np.ndarray) -> tuple[np.ndarray, int] | None:

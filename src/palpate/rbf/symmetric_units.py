@@ -20,7 +20,7 @@ from palpate.rbf.regressors import Regressors, pairs
 
 __all__ = ["Images", "SymmetricRegressors"]
 
-_SAME = 1e-9  # of scaled inputs: round-off of a declared matrix
+_SAME = 1e-9  # difference of scaled inputs that is round-off of a declared matrix
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,13 +32,13 @@ FLAT, LEVEL = 0.999, 0.02
 FOOT = 0.05  # share of the box's footprint that a face has at least to stand on
 HOLD = 0.12  # share of the height that is held where no flat face is below
 RADIUS, DEPTH = 0.18, 0.5  # radius of the probe over the least extent, and its depth over the radius
-LARGEST = 0.3  # radius over the least extent, that a large surface may ask for
+LARGEST = 0.3  # radius over the least extent, for a large surface, at most
 CELLS = 300  # squares of an element's length on the footprint: about 15,000 unknowns, seconds a solve
 COARSE = 0.5  # element over the radius: coarser ones do not feel the ball
-LEAST_DEPTH = 1 / 25  # of the depth
-MARGIN = 3.0  # radii within the box of the touched surface, that places keep by themselves
+LEAST_DEPTH = 1 / 25  # least depth over the largest
+MARGIN = 3.0  # distance of places from the rim of the touched surface's box, in radii
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-LISTED = 20  # faces in the comments
+LISTED = 20  # faces that the comments name, at most
 
 
 def part_study(

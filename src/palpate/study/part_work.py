@@ -45,8 +45,8 @@ __all__ = ["main", "rough_study", "work_on"]
 
 Say = Callable[[dict[str, Any]], None]
 
-_NICE = 5  # below the page and everything else that somebody waits for
-_GRACE = 5.0  # s to end in good order
+_NICE = 5  # niceness: below the page and everything else that somebody waits for
+_GRACE = 5.0  # s in which the work ends in good order
 
 
 def rough_study(study: Study) -> Study | None:

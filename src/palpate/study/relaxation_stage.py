@@ -29,13 +29,13 @@ from palpate.surrogates.memories import Relaxation
 
 __all__ = ["held_press", "prony_times", "with_relaxation"]
 
-DEPTHS = (0.3, 0.9)  # of the study's largest: held presses that are learnt from
-UNSEEN = 0.6  # of the same: the press that judges
+DEPTHS = (0.3, 0.9)  # depths of the held presses that are learnt from, over the study's largest
+UNSEEN = 0.6  # depth of the press that judges, over the study's largest
 EARLY, LATE = 1 / 10, 4.0  # first look over the shortest time, last over the longest
 LOOKS = 14
-SPACING = 0.25  # of the ball's radius: places that remember
-MORE = 1.05  # of the material's share: a ball can't feel more relaxation than the material has
-MOST = 3  # terms that held presses tell apart
+SPACING = 0.25  # distance of the places that remember, over the ball's radius
+MORE = 1.05  # factor of the material's share: a ball can't feel more relaxation than the material has
+MOST = 3  # terms that held presses tell apart, at most
 
 
 def prony_times(study: Any) -> tuple[float, ...]:

@@ -196,7 +196,7 @@ def _unreadable(path: Path, why: str) -> FileFormatError:
     )
 
 
-MOST_STEPS = 400  # of a dataset: a longer slider can't be moved by one
+MOST_STEPS = 400  # steps of a dataset: on a longer slider single ones can't be reached
 
 
 def body_of_file(path: Path, name: str = "") -> ShownBody:

@@ -36,7 +36,7 @@ _DEFAULT = "t,x,y,z,fx,fy,fz"
 _LENGTHS, _FORCES = ("x", "y", "z"), ("fx", "fy", "fz")
 _EXAMPLE = f"palpate {VERSION} length=mm force=N time=s"
 
-_LONGEST = 1000  # bytes of a line
+_LONGEST = 1000  # bytes of a line, at most
 _WAITING = 10_000  # lines read and not yet taken; the sender then waits
 _ANSWERS = 1.0  # s that an answer may take; who does not read them gets none any more
 

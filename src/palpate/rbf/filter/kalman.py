@@ -36,8 +36,9 @@ __all__ = [
     "step_excess",
 ]
 
-TRIES = 5  # with R enlarged from one to the next; a step that is too long in all of them is not taken
-_MEMORY = 0.95  # about twenty observations: long enough to be smooth, short enough to follow the convergence
+TRIES = 5  # updates with a larger R each; a step that is too long in all of them is not taken
+# share that the past keeps: about twenty observations, smooth and still quick enough to follow
+_MEMORY = 0.95
 
 
 def running_mean_square(previous: float, error: np.ndarray, count: int) -> float:

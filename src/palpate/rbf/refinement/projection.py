@@ -24,7 +24,7 @@ __all__ = ["Fit", "Solver", "gauss_newton", "leverage_of_units", "project", "spa
 
 Solver = Literal["kaufman", "full"]
 
-_TAIL_PENALTY = 1e-24  # of round-off's size, so that duplicate samples can't make R singular
+_TAIL_PENALTY = 1e-24  # penalty of round-off's size, so that duplicate samples can't make R singular
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,9 +15,9 @@ from palpate.surrogates.surface.oriented_mesh import CREASE, Corners, OrientedMe
 
 __all__ = ["SMOOTH", "Patches", "patches_of"]
 
-TURN = np.radians(6.0)  # between the normals of a small triangle's corners, at most
-PARTS = 8  # of an edge, at most
-MOST = 60_000  # small triangles
+TURN = np.radians(6.0)  # rad, largest angle between the normals of a small triangle's corners
+PARTS = 8  # parts of an edge, at most
+MOST = 60_000  # small triangles, at most
 SMOOTH, SHARP, END = 0, 1, 2  # kinds of a place: inside a smooth piece, on a crease, on the border
 
 

@@ -51,8 +51,8 @@ __all__ = ["BEHIND", "BRIDGED", "PLAIN", "ROLLED", "ROUNDED", "MeasuredDistance"
 
 # the contact point lies on a smooth piece, on a line, or on a border with a shoulder; below the border; behind the body
 PLAIN, ROUNDED, ROLLED, BRIDGED, BEHIND = 0, 1, 2, 3, 4
-TURN = 2.0  # of the radius: how far it takes to turn back behind
-START, FINISH = 0.5, 0.85  # of the radius: where the bridge below the border begins and ends
+TURN = 2.0  # distance over the radius, in which d turns back behind the surface
+START, FINISH = 0.5, 0.85  # distances over the radius, where the bridge below the border begins and ends
 # cosine between distance and normal, below which small triangles are too coarse for the normal
 RESOLVED = 0.98
 

@@ -8,7 +8,7 @@ from numba import njit
 __all__ = ["DEEP", "disc_tree", "nearest_into"]
 
 LEAF = 2  # triangles in each smallest disc, at most
-ROUNDING = 1e-9  # by which discs are larger than they need be
+ROUNDING = 1e-9  # share by which discs are larger than they need be
 DEEP = 64  # discs that can wait at a time: two for each level of the tree
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")

@@ -18,9 +18,10 @@ from palpate.errors import UsageError
 
 __all__ = ["CREASE", "Corners", "OrientedMesh", "corners_of"]
 
-CREASE = np.cos(np.radians(40.0))  # facets that turn by more meet in an edge of the body, not in a mesh's
-FLAT = 1e-7  # height of a triangle by its longest edge, below which it has no normal
-SAME = 1e-9  # of the surface's size: points closer than that are one
+# cosine; facets that turn by more meet in an edge of the body, not in one of the mesh
+CREASE = np.cos(np.radians(40.0))
+FLAT = 1e-7  # height over longest edge, below which a triangle has no normal
+SAME = 1e-9  # distance over the surface's size, within which two points are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,9 +145,10 @@ def _neighbours(count: int, triangles: np.ndarray) -> np.ndarray:
     return partner.reshape(triangles.shape)
 
 
-TURNS = 3  # of the paraboloid's frame towards the normal that it tells
-UNKNOWNS = 5
-FARTHEST = np.cos(np.radians(30.0))  # a fit that turns the normal by more has not understood the surface
+TURNS = 3  # turns of the paraboloid's frame towards the normal that it finds
+UNKNOWNS = 5  # coefficients of the paraboloid
+# cosine; a fit that turns the normal by more has not understood the surface
+FARTHEST = np.cos(np.radians(30.0))
 
 
 @dataclass(frozen=True, eq=False)

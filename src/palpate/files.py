@@ -39,12 +39,10 @@ __all__ = [
 ]
 
 _PREFIX, _LOCK = "palpate-", "in-use" if os.name != "nt" else "lock"
-_SYNCHRONISED_AT_ONCE = 16
-_MARK, _ABANDONED = (
-    "?" * 8,
-    3600.0,
-)  # pattern of the marks of unfinished files; s after which nobody writes them
-_HALF_DONE = 0.2  # s between two renames, at most
+_SYNCHRONISED_AT_ONCE = 16  # files: a disk takes many in little more than the time of one
+# pattern of the marks of unfinished files; s after which nobody writes them
+_MARK, _ABANDONED = "?" * 8, 3600.0
+_HALF_DONE = 0.2  # s between the two renames that replace a folder, at most
 _WRONG_PATH = {
     errno.ENOENT,
     errno.EEXIST,
@@ -140,9 +138,7 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
             yield part
             from concurrent.futures import ThreadPoolExecutor
 
-            with ThreadPoolExecutor(
-                _SYNCHRONISED_AT_ONCE
-            ) as pool:  # a disk takes many in little more than the time of one
+            with ThreadPoolExecutor(_SYNCHRONISED_AT_ONCE) as pool:
                 list(pool.map(_synchronise, part.rglob("*")))
             if target.exists():
                 os.rename(target, old)
@@ -171,9 +167,8 @@ def restore_folder(path: str | os.PathLike[str]) -> None:
                 time.sleep(_HALF_DONE)  # its process may be about to bring the new one
             if not target.exists():
                 os.rename(old, target)
-            elif (
-                time.time() - old.stat().st_ctime > _ABANDONED
-            ):  # which a rename sets: a younger one may be in use
+            elif time.time() - old.stat().st_ctime > _ABANDONED:
+                # a rename sets that time: a younger folder may be in use
                 shutil.rmtree(old, ignore_errors=True)
 
 

@@ -151,7 +151,7 @@ def summary_figure(name: str, value: object) -> object:
     return share(value) if name.startswith("force error") or name in _LEFT_OUT else value
 
 
-_LEFT_OUT = ("median", "p95")  # of the force errors on solves left out while learning
+_LEFT_OUT = ("median", "p95")  # statistics of the force errors on solves left out while learning
 
 
 def number(value: float, digits: int = 4) -> str:

@@ -61,11 +61,8 @@ _COMMENTS = {
 _SENTENCE = "Written by palpate; the next export replaces this file unless it was changed. Checksum "
 _LAST_LINE = re.compile(rb"[^\n]*" + re.escape(_SENTENCE.encode()) + rb"([0-9a-f]{16})[^\n]*\n\Z")
 _LONGEST_LINE = 200
-_ACTING = {
-    "interaction",
-    "loads",
-    "probe",
-}  # what a study has one of, the latter two in files of version 0.1.0
+# a study has one of these, the latter two in files of version 0.1.0
+_ACTING = {"interaction", "loads", "probe"}
 _LIBRARIES = {".so", ".dylib", ".dll"}
 _TABLES = {".csv", ".parquet", ".nc", ".npz"}  # formats without a place for a mark
 # what names palpate in other formats, and in how many bytes from the start
@@ -211,9 +208,8 @@ def is_own(path: Path) -> bool:
         return all(name + function in content for function in (b"_hash", b"_limits", b"_deviation"))
     if ending in {".json", ".fmu"}:
         return _is_card(content) if ending == ".json" else _is_fmu(path)
-    return ending == ".palpate" or _is_archive(
-        content
-    )  # nobody else has that ending, and a damaged one is no loss
+    # nobody else has that ending, and a damaged file is no loss
+    return ending == ".palpate" or _is_archive(content)
 
 
 def _is_archive(content: bytes) -> bool:

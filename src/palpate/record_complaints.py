@@ -19,7 +19,7 @@ from palpate.records import Unit
 
 __all__ = ["complaints", "range_words", "unit_in"]
 
-_LONGEST = 60  # characters of what a complaint repeats
+_LONGEST = 60  # characters of an input that a complaint repeats
 _BOUNDS = {"greater_than": "gt", "greater_than_equal": "ge", "less_than": "lt", "less_than_equal": "le"}
 _KINDS = {
     "float": "number",

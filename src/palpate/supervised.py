@@ -45,12 +45,10 @@ GRACE = 5.0  # s after a call's limit in which the child ends by itself, with th
 _LOOK = 0.05  # s between looks at the memory of a child
 _IDLE = 10.0  # s without a call after which a shared child is ended
 READER = "read_requests"  # the function of a child's second thread, whose place is of no interest
-_OWN_FRAMES = ("supervised_child.py", "<frozen runpy>")  # below those of the work
+_OWN_FRAMES = ("supervised_child.py", "<frozen runpy>")  # files of the frames below those of the work
 _READ_SECONDS, _READ_RATE = 40.0, 5e5  # s that reading any file may take; bytes for each s more
-_READ_MEMORY, _READ_GROWTH = (
-    1.5e9,
-    50.0,
-)  # bytes that reading may take; more for each byte of a file, packed ones too
+# bytes that reading may take; more for each byte of a file, packed ones too
+_READ_MEMORY, _READ_GROWTH = 1.5e9, 50.0
 _HEAD = struct.Struct(">Q")
 _DETAILS = 4000  # characters of the child's last words that are kept
 

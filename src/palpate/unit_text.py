@@ -134,11 +134,8 @@ def _pieces(text: str) -> Iterator[str]:
         raise UsageError(f"'{text[:20]}…' has too many characters for a unit.")
     if text.count("%") > 1:
         raise UsageError(f"{text!r} is no unit: a share is in % once.")
-    place, below, operand = (
-        0,
-        [False],
-        False,
-    )  # of each open bracket: whether a slash came; whether a name came last
+    # place in the text; of each open bracket, whether a slash came; whether a name came last
+    place, below, operand = 0, [False], False
     while place < len(text):
         match = _PIECE.match(text, place)
         if match is None:

@@ -26,7 +26,7 @@ from palpate.units import Range, parse_quantity
 
 __all__ = ["answers_at", "ask", "deflections", "inputs_of"]
 
-_STEPS = 16  # in a radius
+_STEPS = 16  # steps along a way, in a radius
 _NOUNS = {
     "Surrogate": "A learnt body",
     "Fitted": "A network of data, with intervals",

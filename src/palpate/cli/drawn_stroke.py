@@ -17,8 +17,8 @@ from palpate.units import bounds, parse_quantity
 
 __all__ = ["reservations_about", "stroke_of"]
 
-_ROUNDING = 1e-9  # of a depth
-_TRIED = 8  # places
+_ROUNDING = 1e-9  # share of a depth that is round-off
+_TRIED = 8  # deepest places that are tried, at most
 
 
 def stroke_of(body: Surrogate, steps: int, at: str | None = None, depth: float | None = None) -> np.ndarray:

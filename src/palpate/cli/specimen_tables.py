@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["KINDS", "SpecimenTables"]
 
 KINDS = ("uniaxial", "equibiaxial", "planar", "indentation", "relaxation")
-_SIDES = ("tension", "compression")  # of a uniaxial test, for --test too
+_SIDES = ("tension", "compression")  # sides of a uniaxial test, for --test too
 _WORDS = {
     "equibiaxial": ("equibiaxial", "biaxial", "bulge", "inflation"),
     "planar": ("planar", "pure shear", "pure_shear", "pure-shear", "pureshear"),
@@ -42,7 +42,7 @@ _UNITS = {
 _UNITS |= dict.fromkeys(("stretch", "strain", "log strain"), "")
 """What a column can hold, with its SI unit."""
 _PERCENT = 3.0  # strain without a unit, above which it may be in per cent
-_STRAY = 0.1  # of the largest value: values of the other sign that are noise
+_STRAY = 0.1  # share of the largest value, up to which values of the other sign are noise
 
 
 @dataclass(frozen=True)

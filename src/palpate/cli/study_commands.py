@@ -155,14 +155,7 @@ def learn_file(study: Path, console: Console, *, watch: bool = False) -> None:
     """
     from palpate.cli.growth_view import watch_growth
     from palpate.study import read_study
-    from palpate.study.run import (
-        Paths,
-        learn_study,
-        load_data,
-        save_model,
-        validate_study,
-        with_validation,
-    )
+    from palpate.study.run import Paths, learn_study, load_data, save_model, validate_study, with_validation
     from palpate.study.study_advice import earlier_curve
 
     with console.patience(f"Reading {study}"):

@@ -27,10 +27,8 @@ __all__ = ["ChunkFault", "chunk_faults", "missing_chunks", "unreadable_chunks"]
 
 _LONGEST_TEXT = 1 << 16  # bytes of a single text, such as a message with its traceback
 _TEXT_HEAD = 4  # bytes before each text, and before all of them
-_MOST_TEXT, _TEXT_RATIO = (
-    250_000_000,
-    1000,
-)  # bytes that a chunk of texts may hold, and more for each byte stored
+# bytes that a chunk of texts may hold, and more for each byte stored
+_MOST_TEXT, _TEXT_RATIO = 250_000_000, 1000
 _CRC = 4  # bytes of the checksum behind a chunk
 
 

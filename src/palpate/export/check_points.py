@@ -37,7 +37,7 @@ __all__ = [
     "true_answers",
 ]
 
-ANSWERS = 21  # an answer's 19 numbers, the deviation, the flags
+ANSWERS = 21  # numbers of an answer: its 19, the deviation, the flags
 CONTACT, TRUSTED, NOT_A_NUMBER, TOO_DEEP = 1, 2, 4, 8
 _TIGHT, _LOOSEST, _DEVIATION = 1e-12, 1e-9, 1e-5
 _PARTS = {
@@ -47,7 +47,7 @@ _PARTS = {
     "stiffness": list(range(5, 14)),
     "amplitude": [15],
 }
-_ROUND_OFF = 1e-14  # m, of a depth
+_ROUND_OFF = 1e-14  # m, depth that is round-off
 _TOUCHES = 24  # places at which a field is compared, beside the deepest touches
 _STROKE = 300  # steps of a memory's stroke
 

@@ -49,7 +49,7 @@ _OPTIONS = (
     "-Wextra",
 )
 _HASHES = "hashes.json"
-_LONGEST = 600.0  # s
+_LONGEST = 600.0  # s that a build may take
 
 
 def fmu_source() -> str:

@@ -30,7 +30,7 @@ from palpate.surrogates.model_card import card_of
 __all__ = ["VERSIONS", "ExportedFmu", "export_fmu"]
 
 VERSIONS = ("2.0", "3.0")
-_WHEN = (1980, 1, 1, 0, 0, 0)  # the same file each time
+_WHEN = (1980, 1, 1, 0, 0, 0)  # date of each file in the archive, so that equal contents make equal archives
 
 
 @dataclass(frozen=True)

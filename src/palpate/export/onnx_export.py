@@ -144,9 +144,8 @@ class OnnxAsker:
         """Return an answer's 19 numbers, the deviation and the flags for each row of X (N, 3 + p)."""
         baseline, names = self._energy.baseline, [o.name for o in self._session.get_outputs()]
         D = baseline.directions
-        X = np.where(
-            np.isfinite(X).all(axis=1)[:, None], X, np.nan
-        )  # an infinite place along one axis is none along another
+        # a place that is infinite along one axis has no coordinates along the others
+        X = np.where(np.isfinite(X).all(axis=1)[:, None], X, np.nan)
         U = X if len(D) == 3 else np.hstack([X[:, :3] @ D.T, X[:, 3:]])
         got = dict(zip(names, self._session.run(None, {"x": U.astype(self._kind)}), strict=True))
         out = np.full((len(X), ANSWERS), np.nan)

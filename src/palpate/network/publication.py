@@ -42,13 +42,7 @@ _HEAD = 8  # serial, h, r, k, whether there is a basis, radial function; two to 
 
 
 def _create(text: Mapping[str, Any]) -> _Memory:
-    """Make the memory that `text` describes.
-
-    Raises
-    ------
-    OSError
-        If there is no room for it.
-    """
+    """Make the memory that `text` describes; an OSError says that there is no room for it."""
     content = json.dumps(text).encode()
     head = bytearray(_MAGIC.ljust(_TEXT, b"\0") + content)
     head[_LENGTH : _LENGTH + 8] = np.int64(len(content)).tobytes()

@@ -132,9 +132,8 @@ def sweep_study(
         return train, test
     with contextlib.ExitStack() as stack:
         if cluster is None:
-            own = OnDemandCluster(
-                study.sweep.workers
-            )  # both sweeps: to start workers takes seconds, and to open a body
+            # one for both sweeps: to start workers takes seconds, and so does to open a body
+            own = OnDemandCluster(study.sweep.workers)
             cluster = study.sweep.scheduler or stack.enter_context(own)
         common: dict[str, Any] = {"cluster": cluster, "progress": progress, "case_limit": case_limit}
         log(f"{count(study.sweep.samples, 'solve')} to learn from{_solved_part(study, problem)}")

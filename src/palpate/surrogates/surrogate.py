@@ -31,16 +31,10 @@ from palpate.units import Range, bounds
 
 __all__ = ["KIND", "Surrogate", "correction_count", "correction_warning"]
 
-_SAMPLES = 4096  # of the trained ranges, for a typical press
+_SAMPLES = 4096  # places in the trained ranges, among which a typical press is found
 KIND = "surrogate"  # what the file's header calls it
-_FORMER = (
-    "touch",
-    "held-body",
-    "touched-body",
-    "touch-surrogate",
-    "grasp-surrogate",
-    "field-surrogate",
-)  # of 0.1.0
+# kinds of files of version 0.1.0
+_FORMER = ("touch", "held-body", "touched-body", "touch-surrogate", "grasp-surrogate", "field-surrogate")
 
 
 @dataclass(frozen=True, eq=False)

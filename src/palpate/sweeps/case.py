@@ -38,8 +38,8 @@ __all__ = [
 
 OPEN_LIMIT = 600.0
 """Time in s that opening a problem may take at least: it meshes, and imports what it needs."""
-_TRIES = 2  # that a case gets: the first may have ended for a reason of its own, such as want of memory
-_TRACE = 3000  # characters of a traceback that a row keeps, its end
+_TRIES = 2  # tries of a case: the first may have ended for a reason of its own, such as want of memory
+_TRACE = 3000  # characters that a row keeps of the end of a traceback
 
 Columns: TypeAlias = dict[str, np.ndarray]
 """An array for each answer of a dataset, samples first."""

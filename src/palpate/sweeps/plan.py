@@ -24,13 +24,7 @@ from palpate.sweeps.case import Columns
 from palpate.sweeps.problem import Checking, Designed, Problem, has_chains, missing_members, own_design
 from palpate.sweeps.space import Design, Space, design_points
 
-__all__ = [
-    "Plan",
-    "config_hash",
-    "make_plan",
-    "neighbour_chains",
-    "provenance",
-]
+__all__ = ["Plan", "config_hash", "make_plan", "neighbour_chains", "provenance"]
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ __all__ = ["connect", "deferred_interrupt", "run"]
 
 _PATIENCE = 0.5  # s between looks at the workers
 _FETCH = 5.0  # s; Dask's client may wait for ever for a result whose worker died just after it
-_TRIES = 3  # that a chain gets on workers that vanish
+_TRIES = 3  # tries of a chain on workers that vanish
 _KEPT = "What is solved is kept where the sweep has a path: the same command goes on."
 
 

@@ -15,15 +15,7 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.units import Range, bounds
 
-__all__ = [
-    "DESIGNS",
-    "Design",
-    "Space",
-    "design_points",
-    "grid",
-    "random",
-    "sobol",
-]
+__all__ = ["DESIGNS", "Design", "Space", "design_points", "grid", "random", "sobol"]
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from palpate.validation.unseen_solves import ForceSamples, TouchSolves, force_jn
 
 __all__ = ["TouchComparison", "compare_traces", "solves_beside"]
 
-_NEAR = 0.05  # of the inputs' half ranges: how near to a stroke a solve lies beside it
+_NEAR = 0.05  # distance in half ranges of the inputs, within which a solve lies beside a stroke
 _AT_LEAST = 20  # solves beside a stroke that are shown, though none may be so near
 
 

@@ -42,12 +42,12 @@ __all__ = ["ExportedPage", "export_html", "html_page"]
 STATIC = Path(__file__).parent / "static"
 # modes and moving nodes: the page sums the shape up itself
 DRAWN_BY_THE_PAGE = (FIELD + 4, FIELD + 6, FIELD + 7)
-LARGEST = 5_000_000  # bytes of a file, more than which no further field makes it
-DEEP = 2.0  # of the deepest trained depth, at which the body lets go
-RATE = 60.0  # Hz, of the pictures
+LARGEST = 5_000_000  # bytes of a file, beyond which no further field is added
+DEEP = 2.0  # depth at which the body lets go, over the deepest trained depth
+RATE = 60.0  # Hz, rate of the pictures
 _MARGIN = 20_000  # bytes for facts, card and the document around the parts
-MOVED = 0.1  # of the promise for a field: by how much rounding a place may move it
-FINEST = 2**-28  # of the body's size, least step of its places; without a field it is 2**-19
+MOVED = 0.1  # share of a field's promise, by which rounding a place may move it
+FINEST = 2**-28  # least step of places over the body's size; without a field it is 2**-19
 
 
 class _Settings(NamedTuple):

@@ -45,7 +45,7 @@ __all__ = [
     "way_in",
 ]
 
-TRIES = 50  # a machine with that many servers side by side wants to be told
+TRIES = 50  # ports tried: a machine with that many servers side by side should hear of it
 READ = 4096  # bytes that the system keeps of what a page sends and is not read yet; it may double them
 
 

@@ -29,20 +29,14 @@ from typing import BinaryIO
 from palpate.dataset.measured.measured_columns import Columns, Measurements
 from palpate.errors import UsageError
 
-__all__ = [
-    "VERSION",
-    "Connection",
-    "greeting",
-    "lines_of",
-    "measurements",
-]
+__all__ = ["VERSION", "Connection", "greeting", "lines_of", "measurements"]
 
 VERSION = "1"
 _DEFAULT = "t,x,y,z,fx,fy,fz"
 _LENGTHS, _FORCES = ("x", "y", "z"), ("fx", "fy", "fz")
 _EXAMPLE = f"palpate {VERSION} length=mm force=N time=s"
 
-_LONGEST = 1000  # bytes of a line
+_LONGEST = 1000  # bytes of a line, at most
 _WAITING = 10_000  # lines read and not yet taken; the sender then waits
 _ANSWERS = 1.0  # s that an answer may take; who does not read them gets none any more
 

@@ -31,9 +31,8 @@ MEASURES = {
 """Formulas of the units of blocks, by their names."""
 
 PURE = frozenset({"TOSTRAIN", "MESTRAIN", "PE"})
-IGNORED = frozenset(
-    {"ERROR"}
-)  # an estimate of the discretisation's error in per cent, of no use beside a mesh
+# an estimate of the discretisation's error in per cent, of no use beside a mesh
+IGNORED = frozenset({"ERROR"})
 
 # number of nodes and kind of each type of element
 _TYPES = {

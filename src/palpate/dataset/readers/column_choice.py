@@ -20,7 +20,7 @@ from palpate.unit_text import si_conversion
 __all__ = ["chosen_columns", "find_columns", "index_of_place", "places_in_metres"]
 
 _PART = re.compile(r"^(?P<base>.*?)\.(?P<part>\w+)(?P<set> of .*)?$")
-NEAR = 0.01  # of the body's size: a node farther away is not the one that was meant
+NEAR = 0.01  # distance over the body's size, beyond which a node is not the one that was meant
 
 _REDUCE: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "max": lambda v: v.max(axis=1),

@@ -16,7 +16,7 @@ from palpate.format import count
 __all__ = ["along_axes", "body_layout"]
 
 _REST = "surface"  # name of the triangles that belong to no surface of the mapping
-_SAME = 1e-6  # of the body's size: coordinates printed with six digits
+_SAME = 1e-6  # distance over the body's size that is rounding of coordinates printed with six digits
 
 
 def along_axes(results: Results, mapping: ImportMapping, values: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from palpate.units import Range
 __all__ = ["with_energies"]
 
 FEWEST = 4  # solves for a cubic spline
-_CONTRADICTION = 1e-3  # of the largest energy; integrals over ten loads are ten times as good
+_CONTRADICTION = 1e-3  # share of the largest energy; integrals over ten loads are ten times as good
 
 
 def with_energies(

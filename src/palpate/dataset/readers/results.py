@@ -20,8 +20,8 @@ __all__ = ["TIME", "Column", "Places", "Results", "join_cases", "join_columns", 
 TIME = "time"
 """Name of the column with the time or the load factor of each case, where a format has one."""
 
-SAME_PLACE = 1e-6  # of the body's size: coordinates printed with six digits
-SAME_TIME = 1e-5  # relative: times printed with six digits
+SAME_PLACE = 1e-6  # distance over the body's size that is rounding of coordinates printed with six digits
+SAME_TIME = 1e-5  # relative difference that is rounding of times printed with six digits
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["comparison_pictures", "plot_comparison", "plot_trace", "save_figure"]
 
-_POINTS = 4000  # of a line: more can't be seen
+_POINTS = 4000  # points of a line; the eye can't tell more
 Solved = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Depths (k,) of solves, m, and the sizes of their forces and of the surrogate's at the same places, N."""
 

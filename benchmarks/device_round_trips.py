@@ -1,6 +1,6 @@
 """Round trips a second of the loop with a simulated Haply service, in lock step: one answer for each command.
 
-python -m benchmarks.device_round_trips [--quick] [--json | --markdown]
+python -m benchmarks.device_round_trips [--quick] [--json]
 """
 
 from __future__ import annotations

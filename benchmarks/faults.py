@@ -1,6 +1,6 @@
 """A thousand faults of every kind in the midst of a touch: how soon there is no force, and how it comes back.
 
-python -m benchmarks.faults [--quick] [--json | --markdown]
+python -m benchmarks.faults [--quick] [--json]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A simulated hand on every device's profile, on four bodies: energy, force, rest; beside the loop without its control.
 
-    python -m benchmarks.hand_drives [--quick] [--json | --markdown]
+    python -m benchmarks.hand_drives [--quick] [--json]
 
 Each run is the loop as it is, from the encoder to the force sent, for a minute of its own time, computed as fast as it
 goes. The hand moves at random, or so as to shake, or goes after a recorded hand; then it presses and stays. The rival

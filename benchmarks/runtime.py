@@ -1,6 +1,6 @@
 """The 1 kHz loop in its own process: moved by a scripted hand, and at rest where nobody touches.
 
-python -m benchmarks.runtime [--quick] [--json | --markdown]
+python -m benchmarks.runtime [--quick] [--json]
 """
 
 from __future__ import annotations

@@ -168,6 +168,20 @@ def test_every_path_named_exists(page: Path):
     assert {path for path in named if not exists(path)} == set()
 
 
+def test_the_reference_has_every_public_name():
+    text = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "reference").glob("*.md"))
+    import palpate
+
+    listed = [path.rpartition(".")[2] for path in re.findall(r"^::: palpate\.(\S+)", text, re.MULTILINE)]
+    assert sorted(listed) == sorted(palpate.__all__)
+
+
+def test_every_page_is_in_the_navigation():
+    docs = ROOT / "docs"
+    named = set(re.findall(r"[\w/-]+\.md", (ROOT / "mkdocs.yml").read_text(encoding="utf-8")))
+    assert named == {page.relative_to(docs).as_posix() for page in docs.rglob("*.md")}
+
+
 def test_pictures_are_small():
     pictures = list((ROOT / "docs" / "images").iterdir())
     assert pictures

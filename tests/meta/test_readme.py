@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import importlib.util
 import re
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -167,21 +166,6 @@ def test_every_path_named_exists(page: Path):
     named = set(re.findall(r"(?<![\w./-])(?:[\w.-]+/)*\w+\.(?:py|ts)\b", text))
     named |= set(re.findall(r"(?<![\w./-])(?:src|tests|docs|examples|benchmarks)(?:/[\w.-]+)+", text))
     assert {path for path in named if not exists(path)} == set()
-
-
-def test_every_folder_of_the_architecture_exists():
-    text = code((ROOT / "docs" / "concepts" / "architecture.md").read_text(encoding="utf-8"))
-    folders = set(re.findall(r"(?<![\w./-])(\w+)/(?=[\s,;:]|$)", text, re.MULTILINE))
-    assert len(folders) > 20
-    assert {folder for folder in folders if not exists(folder)} == set()
-
-
-def test_the_architecture_has_the_layers_of_the_contract():
-    text = (ROOT / "docs" / "concepts" / "architecture.md").read_text(encoding="utf-8")
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    contracts = project["tool"]["importlinter"]["contracts"]
-    layers = next(contract["layers"] for contract in contracts if contract["type"] == "layers")
-    assert "".join(f"    {layer.replace('palpate.', '')}\n" for layer in layers) in text
 
 
 def test_pictures_are_small():

@@ -85,21 +85,11 @@ class Refinement:
 
 @dataclass(frozen=True, eq=False)
 class LearntBent:
-    """A body that loads bend, and how it was learnt.
-
-    Attributes
-    ----------
-    surrogate : Surrogate
-        The learnt body.
-    energy : EnergyHistory
-        How its energy was found.
-    filter : Learned
-        The sequential filter's answer for the nodes' displacements, with its history.
-    """
+    """A body that loads bend, and how it was learnt."""
 
     surrogate: Surrogate
-    energy: EnergyHistory
-    filter: Learned
+    energy: EnergyHistory  # how its energy was found
+    filter: Learned  # the sequential filter's answer for the nodes' displacements
 
 
 def learn_bent(

@@ -133,7 +133,7 @@ class PartPage(LocalServer):
         `PalpateError`, which the page answers with; otherwise it returns at once, and the work goes on elsewhere.
     on_unit : callable, optional
         Gets another unit of the file's numbers, and returns the part as it is then; by default the unit stays.
-    port, host, strict_port, token
+    port, host, strict_port, token : int, str, bool, bool
         As for `Viewer`.
     device : str
         The real-time process's device: ``page`` is the page's own hand.

@@ -60,7 +60,7 @@ __all__ = ["PartPage", "Progress", "serve_part"]
 
 logger = logging.getLogger("palpate.viewer")
 
-MOST_PAGES = 32
+MOST_PAGES = 32  # pages that are served at a time
 PATIENCE = 1.0  # s that a page has to take news
 # messages of a page, per second and at once; a start after long brushing takes fifty
 MESSAGES, MESSAGES_AT_ONCE = 20.0, 200.0

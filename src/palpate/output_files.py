@@ -60,7 +60,7 @@ _COMMENTS = {
 
 _SENTENCE = "Written by palpate; the next export replaces this file unless it was changed. Checksum "
 _LAST_LINE = re.compile(rb"[^\n]*" + re.escape(_SENTENCE.encode()) + rb"([0-9a-f]{16})[^\n]*\n\Z")
-_LONGEST_LINE = 200
+_LONGEST_LINE = 200  # bytes at the end of a file in which its mark stands
 # a study has one of these, the latter two in files of version 0.1.0
 _ACTING = {"interaction", "loads", "probe"}
 _LIBRARIES = {".so", ".dylib", ".dll"}

@@ -21,7 +21,7 @@ HEAD = 18
 # and blosc hands each of its blocks to one of these or to LZ4, which gives 255
 _DEFLATE, _ZSTD, _SLACK = 1032, 1 << 15, 1 << 17
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-_BLOSC_HEAD = 16
+_BLOSC_HEAD = 16  # bytes of the head of a Blosc frame
 
 
 def promised_size(codec: str, head: bytes, length: int) -> int:

@@ -29,7 +29,7 @@ WIDTH, HEIGHT = 60, 12  # characters of the map
 EVERY = 0.1  # s between pictures
 BLOCKS = "▁▂▃▄▅▆▇█"
 GREW, VANISHED, UNIT, SAMPLE = "◉", "×", "●", "·"
-NAMES = 18
+NAMES = 18  # characters of the column of names
 
 
 @contextlib.contextmanager

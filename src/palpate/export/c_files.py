@@ -35,7 +35,7 @@ from palpate.units import Quantity, Range
 
 __all__ = ["body_sizes", "c_files", "require_name"]
 
-_WIDTH = 118
+_WIDTH = 118  # characters of a line of numbers
 # bytes of all stack frames of the core together: double (False) and single precision (True)
 _STACK = {False: 12_000, True: 8_000}
 _RADIAL, _SURFACE = 40, 8000  # operations of a radial function; of five distances to a curved surface

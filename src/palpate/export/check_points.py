@@ -39,6 +39,7 @@ __all__ = [
 
 ANSWERS = 21  # numbers of an answer: its 19, the deviation, the flags
 CONTACT, TRUSTED, NOT_A_NUMBER, TOO_DEEP = 1, 2, 4, 8
+# relative errors: at condition 1, at most, and of the deviation
 _TIGHT, _LOOSEST, _DEVIATION = 1e-12, 1e-9, 1e-5
 _PARTS = {
     "energy": [0],

@@ -24,7 +24,7 @@ from palpate.units import bounds
 
 __all__ = ["PROMISE", "SURFACE", "VARIED", "RoundedModes", "chosen_field", "deepest_touches", "field_tables"]
 
-SURFACE, VARIED = 49, 52
+SURFACE, VARIED = 49, 52  # places of the field's surface and varied tables in the block
 PROMISE = 1e-4  # error over a field's largest change, to which the exported field keeps
 _LARGEST = 32767  # largest number of int16, in which modes are rounded
 # share of the promise that rounding the modes may use up; the rest is for places, and for single precision

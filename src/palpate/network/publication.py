@@ -139,7 +139,7 @@ class Publisher:
 
         Parameters
         ----------
-        inputs, outputs
+        inputs, outputs : sequences of Range and of Quantity
             Of every network that will be published.
         units, rank, modes : int
             Capacities; rank is n unless given, and without modes only networks without a basis are taken.
@@ -235,7 +235,7 @@ class Subscriber:
     ----------
     name : str
         `Publisher.name`.
-    precision, jacobian
+    precision, jacobian : str, bool
         Of the evaluator, see `Network.evaluator`.
 
     Attributes

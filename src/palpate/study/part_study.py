@@ -37,6 +37,7 @@ CELLS = 300  # squares of an element's length on the footprint: about 15,000 unk
 COARSE = 0.5  # element over the radius: coarser ones do not feel the ball
 LEAST_DEPTH = 1 / 25  # least depth over the largest
 MARGIN = 3.0  # distance of places from the rim of the touched surface's box, in radii
+# leading numbers to which a proposal is rounded
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 LISTED = 20  # faces that the comments name, at most
 

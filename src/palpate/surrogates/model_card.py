@@ -22,7 +22,7 @@ from palpate.units import Range
 
 __all__ = ["FORMAT_VERSION", "NOT_STATED", "ModelCard", "card_of"]
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 1  # version of the card's own layout
 NOT_STATED = "not stated"
 
 

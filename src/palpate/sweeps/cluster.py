@@ -269,7 +269,13 @@ class Scheduler:
         )
 
     def security(self) -> Any:
-        """Return Dask's record of these files, with what its configuration adds; None for an address without TLS."""
+        """Return Dask's record of these files, with what its configuration adds; None for an address without TLS.
+
+        Raises
+        ------
+        UsageError
+            If the address asks for certificates that are neither given nor configured.
+        """
         import distributed
 
         if not self.address.startswith("tls://"):

@@ -60,7 +60,7 @@ __all__ = ["PartPage", "Progress", "serve_part"]
 
 logger = logging.getLogger("palpate.viewer")
 
-MOST_PAGES = 32
+MOST_PAGES = 32  # pages that are served at a time
 PATIENCE = 1.0  # s that a page has to take news
 # messages of a page, per second and at once; a start after long brushing takes fifty
 MESSAGES, MESSAGES_AT_ONCE = 20.0, 200.0
@@ -133,7 +133,7 @@ class PartPage(LocalServer):
         `PalpateError`, which the page answers with; otherwise it returns at once, and the work goes on elsewhere.
     on_unit : callable, optional
         Gets another unit of the file's numbers, and returns the part as it is then; by default the unit stays.
-    port, host, strict_port, token
+    port, host, strict_port, token : int, str, bool, bool
         As for `Viewer`.
     device : str
         The real-time process's device: ``page`` is the page's own hand.

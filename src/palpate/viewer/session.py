@@ -56,7 +56,7 @@ RATE_KNOWN = 0.5  # s after the loop has rested until its rate is that of a touc
 WATCH = 0.1  # s between looks at the real-time process
 PATIENCE = 1.0  # s that a page has to take news of all pages
 GRACE = 0.5  # s; a signal that ends the whole program may reach the real-time process first
-MOST_PAGES = 32
+MOST_PAGES = 32  # pages that are served at a time
 # messages of a page, per second and at once; a display at 360 Hz needs 485
 MESSAGES, MESSAGES_AT_ONCE = 1000.0, 250.0
 SLICE = 0.02  # s; a page that is owed less than that is heard on

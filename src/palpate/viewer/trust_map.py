@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["NOT_TOUCHED", "NOT_TRAINED", "trust_map"]
 
-NOT_TOUCHED, NOT_TRAINED = -1.0, -2.0
+NOT_TOUCHED, NOT_TRAINED = -1.0, -2.0  # values in place of a deviation
 SHARE = 0.5  # depth of the ball at each point, over the deepest trained depth
 TYPICAL = 95  # percentile of the deviations at which the colour scale ends
 

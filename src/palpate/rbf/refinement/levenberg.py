@@ -26,7 +26,7 @@ __all__ = [
     "next_damping",
 ]
 
-DAMPING = (1e-12, 1e12)
+DAMPING = (1e-12, 1e12)  # least and largest damping
 MORE = 4.0  # factor of the damping after a step that did not help
 _LONGEST = 1.0  # largest change of a log width, or of a centre in units of its width, in one iteration
 _FLOOR = 1e-2  # share of the mean curvature: a unit of hardly any weight would else move freely

@@ -48,7 +48,7 @@ __all__ = [
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 # a product and a sum rounded once: faster, and no less exact
 _fused = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-FRAME = 8
+FRAME = 8  # numbers of a place before the further inputs
 SIXTH = 1.0 / 6.0
 
 

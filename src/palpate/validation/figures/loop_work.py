@@ -30,7 +30,7 @@ __all__ = [
     "work_of_polygons",
 ]
 
-LOOPS = 100
+LOOPS = 100  # loops that are drawn at random
 BEYOND = 0.3  # share of each range of position, by which loops across the border go beyond it
 GRAZING = 1e-6  # share of the median energy, below which a loop hardly touches
 ORDER = 8  # points of the rule of quadrature

@@ -40,7 +40,7 @@ LINES = 6  # curves that are drawn, at most
 NEAR = 0.02  # distance over the radius, within which a solve lies on a line
 GRID = 61  # places across, for the map of trust
 MARGIN = 0.12  # width of the margin around the tested part, over its size
-MARKED = 5
+MARKED = 5  # worst solves that get a mark
 
 
 def touch_pictures(chapter: Chapter, key: str) -> list[Picture]:

@@ -319,7 +319,10 @@ class Shown(Json):
 
 @dataclass(frozen=True)
 class Notice(Json):
-    """An event in plain words, server to page: what, why and fix, as in every error of palpate."""
+    """An event in plain words, server to page.
+
+    What, why and fix are those of every error of palpate.
+    """
 
     what: str
     why: str

@@ -58,15 +58,7 @@ _FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 @contextlib.contextmanager
 def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a path beside `path` for a file that takes its place when it is whole; else nothing changes.
-
-    Raises
-    ------
-    UsageError
-        If the path can't be a file's, for example because its folder is missing.
-    ResourceError
-        If the disk is full, the folder is write-protected, or the disk fails.
-    """
+    """Yield a path beside `path` for a file that takes its place when it is whole; else nothing changes."""
     target = Path(path)
     # its ending stays: it tells some writers the format
     part = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:8]}.part{target.suffix}")
@@ -88,26 +80,14 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_file(path: str | os.PathLike[str], content: bytes | str) -> Path:
-    """Write a file of these bytes, or of this text in UTF-8, whole or not at all.
-
-    Raises
-    ------
-    UsageError, ResourceError
-        As for `writing`.
-    """
+    """Write a file of these bytes, or of this text in UTF-8, whole or not at all."""
     with writing(path) as part:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
     return Path(path)
 
 
 def require_regular(path: Path) -> None:
-    """Refuse to put a file in the place of a device, a pipe or a socket; what is no longer there is no fault.
-
-    Raises
-    ------
-    UsageError
-        If something other than a file or a folder has that name.
-    """
+    """Refuse to put a file in the place of a device, a pipe or a socket; what is no longer there is no fault."""
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise UsageError(
             f"{path} is a device, a pipe or a socket.",
@@ -121,11 +101,6 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a path beside `path` for a folder that takes its place when it is whole; else nothing changes.
 
     A folder that is there already is replaced.
-
-    Raises
-    ------
-    UsageError, ResourceError
-        As for `writing`.
     """
     target = Path(path)
     mark = uuid.uuid4().hex[:8]
@@ -196,15 +171,7 @@ def _synchronise(path: Path) -> None:
 
 @contextlib.contextmanager
 def system_errors(what: str) -> Iterator[None]:
-    """Turn errors of the operating system, and want of memory, into palpate's own; `what` happened, as a sentence.
-
-    Raises
-    ------
-    UsageError
-        If a path can't be one.
-    ResourceError
-        If the disk is full or write-protected, the memory is used up, or the like.
-    """
+    """Turn errors of the operating system, and want of memory, into palpate's own; `what` happened, as a sentence."""
     try:
         yield
     except PalpateError:

@@ -28,12 +28,7 @@ _PACKAGES = {"NumPy": "numpy", "Numba": "numba", "NGSolve": "ngsolve"}
 def report(console: Console, seconds: float = 10.0) -> None:
     """Print every finding; a miss that palpate can live without is no failure.
 
-    Parameters
-    ----------
-    console : Console
-        Where it is printed.
-    seconds : float
-        Duration of the timing test, s; 0 leaves it out.
+    The timing test takes `seconds`; 0 leaves it out.
     """
     machine = survey()  # before the test, which is itself a load
     checks = [*_software(), *machine, *_optional()]

@@ -53,13 +53,7 @@ _MISSING = {
 
 
 def _read(file: Path) -> Surrogate | Network:
-    """Return the body or the network of a file.
-
-    Raises
-    ------
-    UsageError
-        If it holds neither.
-    """
+    """Return the body or the network of a file."""
     from palpate.learning.loading import load
     from palpate.network import Network
     from palpate.surrogates import Surrogate

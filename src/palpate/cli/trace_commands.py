@@ -95,13 +95,7 @@ def _read(file: Path, console: Console) -> Trace:
 
 
 def _model_of(trace: Trace) -> Path:
-    """Return the file of the recorded model, by its checksum where it was and beside the trace.
-
-    Raises
-    ------
-    UsageError
-        If it isn't there.
-    """
+    """Return the file of the recorded model, by its checksum where it was and beside the trace."""
     from palpate.runtime.replay import is_recorded_model
 
     known = trace.header.get("model", {})

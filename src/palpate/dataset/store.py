@@ -186,10 +186,7 @@ def _sound_rows(
 ) -> xarray.Dataset:
     """Return the rows that no damage has reached, with a warning.
 
-    Raises
-    ------
-    ValueError
-        If something else than rows is damaged, or no row is left.
+    A `ValueError` says that something else than rows is damaged, or that no row is left.
     """
     stated = {name: text for name, text in checksums.items() if name != _PROVENANCE}
     first = next((str(fault) for found in faults.values() for fault in found), "")

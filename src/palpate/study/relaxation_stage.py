@@ -41,10 +41,7 @@ MOST = 3  # terms that held presses tell apart, at most
 def prony_times(study: Any) -> tuple[float, ...]:
     """Return the relaxation times in s, ascending, of a study's solid materials; none where nothing relaxes.
 
-    Parameters
-    ----------
-    study : Study
-        Any study; only bodies that a ball presses have such a memory.
+    Only bodies that a ball presses have such a memory.
     """
     if study.interaction.kind != "probe":
         return ()

@@ -111,21 +111,9 @@ def local_application(routes: Sequence[BaseRoute], **options: Any) -> Starlette:
 class LocalServer(ABC):
     """A page at `url` while the context lasts; the base of what serves one.
 
-    Parameters
-    ----------
-    port : int
-        The port wanted; 0 takes any free one.
-    host : str
-        ``127.0.0.1``, ``localhost`` or ``::1``: it serves this machine only.
-    strict_port : bool
-        Whether a busy port is an error; otherwise the next free one is taken.
-    token : bool
-        Whether a page must show the token that stands in `url`.
-
-    Attributes
-    ----------
-    port : int
-        The port taken, once started.
+    `port` is the one wanted, 0 for any free one, and once started the one taken; a busy port is an error with
+    `strict_port`, otherwise the next free one is taken. `host` is ``127.0.0.1``, ``localhost`` or ``::1``: this machine
+    only. With `token` a page must show the token that stands in `url`.
     """
 
     def __init__(self, port: int, host: str, *, strict_port: bool, token: bool) -> None:
@@ -161,17 +149,7 @@ class LocalServer(ABC):
         """Return the web application; what it needs until the end enters `_closing`."""
 
     def start(self) -> Self:
-        """Start the server and all that it needs; the page can be opened when this returns. Harmless when repeated.
-
-        Raises
-        ------
-        PortInUseError
-            If no port is free, or the one wanted isn't and `strict_port` is set.
-        UsageError
-            If the host, the port or a device can't be.
-        DeviceError
-            If the server, or the real-time process behind it, doesn't start.
-        """
+        """Start the server and all that it needs; the page can be opened when this returns. Harmless when repeated."""
         if self._thread is not None:
             return self
         try:

@@ -151,13 +151,7 @@ def measurements(lines: Iterable[str], answer: Callable[[str], None]) -> Iterato
 
 
 def greeting(words: list[str]) -> Columns:
-    """Read the columns that a greeting announces.
-
-    Raises
-    ------
-    UsageError
-        If it is none, of another version, or lacks a unit.
-    """
+    """Read the columns that a greeting announces, and refuse one of another version or without a unit."""
     if words[:2] != ["palpate", VERSION]:
         raise UsageError("Units come first.", fix=f"Begin with: {_EXAMPLE}")
     pairs = [word.partition("=")[::2] for word in words[2:]]

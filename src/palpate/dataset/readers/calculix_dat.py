@@ -73,13 +73,8 @@ def is_dat(head: str) -> bool:
 def read_dat(path: Path) -> Results:
     """Read the printed results of CalculiX.
 
-    Columns are called ``TITLE.COMPONENT of SET``, such as ``total force.fz of TOP``; of one component alone
-    ``internal energy of BODY``. Each time is a case.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is cut short or damaged, or holds no table of a set.
+    Columns are called ``TITLE.COMPONENT of SET``, such as ``total force.fz of TOP``; of one component alone ``internal
+    energy of BODY``. Each time is a case.
     """
     cases: list[tuple[float, dict[str, _Table]]] = []
     table: _Table | None = None

@@ -118,11 +118,6 @@ def read_frd(path: Path) -> Results:
     """Read a result file of CalculiX.
 
     Columns are called ``NAME.COMPONENT``, such as ``DISP.D1`` and ``STRESS.SZX``. Each increment is a case.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is cut short or damaged, or has no nodes or no results.
     """
     cursor, read = _Cursor(path, read_bytes(path)), _File()
     step, increment = 0, 0

@@ -49,16 +49,7 @@ def contradiction(
 ) -> list[str]:
     """Return a warning where responses (case, n) and energies contradict each other, or a note where nobody can tell.
 
-    Parameters
-    ----------
-    fields, answers : Field and arrays
-        What the import has of each case.
-    inputs : (case, n) array
-        Inputs in SI units.
-    ranges : n ranges
-        Their ranges.
-    extent : float
-        Largest length of the body in m, for the likely cause.
+    `inputs` (case, n) are in SI units; `extent`, the largest length of the body in m, serves the likely cause.
     """
     name = next((n for n in ("potential_energy", "strain_energy") if n in answers), "")
     has_response = any(f.name == "response" and f.dims == ("input",) for f in fields)

@@ -137,7 +137,7 @@ def _comment(lines: list[str]) -> str:
 
 
 def _head(facts: _Facts, further: list[str]) -> str:
-    from palpate import __version__
+    from palpate.version import __version__
 
     rows = [f"{r.name} from {r.low:g} to {r.high:g} {r.unit}".rstrip() for r in facts.inputs]
     lines = [

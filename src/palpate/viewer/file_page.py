@@ -20,9 +20,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate.errors import AccuracyError, UsageError
+from palpate.errors import UsageError
 from palpate.export.build_core import built_core
-from palpate.export.check_points import Comparison, compare_body, compare_field
+from palpate.export.check_points import Comparison, ExportedFile, compare_body, compare_field
 from palpate.export.field_tables import PROMISE, SURFACE, field_tables
 from palpate.export.wasm_core import WasmCore, wasmtime_module
 from palpate.export.weights_block import FIELD, WeightsBlock
@@ -61,12 +61,9 @@ class _Settings(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ExportedPage:
+class ExportedPage(ExportedFile):
     """A page that was written, and how far it is from palpate."""
 
-    file: Path
-    hash: str  # SHA-256 of the weights
-    comparison: Comparison | None  # None where wasmtime is not installed, or nothing was to be compared
     left_out: tuple[str, ...] = ()  # fields too large for 5 MB, or on other nodes than the first
 
 
@@ -82,12 +79,9 @@ def export_html(
     require_outputs([path], endings=(".html", ".htm"), overwrite=overwrite)
     page = _Page.of(surrogate)
     comparison = page.compare() if check and wasmtime_module() is not None else None
-    if comparison is not None and not comparison.passed:
-        raise AccuracyError(
-            f"The page of {surrogate.name} does not answer as palpate does.",
-            why=str(comparison),
-            fix="Nothing was written. Report this with the model file.",
-        )
+    if comparison is not None:
+        fix = "Nothing was written. Report this with the model file."
+        comparison.require(f"The page of {surrogate.name} does", why="", fix=fix)
     file = write_file(Path(path), with_seal(path, page.text))
     return ExportedPage(file, page.block.hash, comparison, page.left_out)
 

@@ -76,7 +76,7 @@ def _timing_lines(timing: dict[str, Any]) -> Iterator[str]:
 
 
 def _software() -> Iterator[Check]:
-    from palpate import __version__
+    from palpate.version import __version__
 
     yield Check("palpate", ok=True, detail=__version__)
     version = platform.python_version()

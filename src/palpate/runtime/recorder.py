@@ -167,7 +167,7 @@ def machine_facts() -> dict[str, Any]:
     """Return what the last bits of a computed force depend on besides the model: versions, and the processor."""
     import numba
 
-    from palpate import __version__
+    from palpate.version import __version__
 
     return {
         "palpate": __version__,

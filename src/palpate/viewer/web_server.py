@@ -22,7 +22,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar, cast
+from typing import Any, Self, TypedDict, TypeVar, cast
 
 import uvicorn
 from starlette.applications import Starlette
@@ -37,10 +37,12 @@ __all__ = [
     "STATIC",
     "TRIES",
     "LocalServer",
+    "ServerOptions",
     "free_port",
     "in_notebook",
     "listen",
     "local_application",
+    "skeleton",
     "wait_until_interrupted",
     "way_in",
 ]
@@ -102,21 +104,32 @@ START = 10.0  # s until the server must listen
 BACKLOG = 32  # connections that are taken at once, between two looks at what pages sent
 
 
+def skeleton(mode: str) -> str:
+    """Return the document of all pages for one of them: touch, shown or part."""
+    return (STATIC / "index.html").read_text("utf-8").replace('data-mode="touch"', f'data-mode="{mode}"')
+
+
 def local_application(routes: Sequence[BaseRoute], **options: Any) -> Starlette:
     """Return a web application of these routes, which come before the files of the built pages."""
     files = Mount("/", StaticFiles(directory=STATIC, html=True))
     return Starlette(routes=[*routes, files], **options)
 
 
+class ServerOptions(TypedDict, total=False):
+    """Where a page is served."""
+
+    port: int  # the port wanted; 0 takes any free one
+    host: str  # 127.0.0.1, localhost or ::1: pages are served to this machine only
+    strict_port: bool  # whether a busy port is an error; otherwise the next free one is taken
+    token: bool  # whether the page opens only with the token that stands in `url`
+
+
 class LocalServer(ABC):
-    """A page at `url` while the context lasts; the base of what serves one.
+    """A page at `url` while the context lasts; the base of what serves one, at `port` once started."""
 
-    `port` is the one wanted, 0 for any free one, and once started the one taken; a busy port is an error with
-    `strict_port`, otherwise the next free one is taken. `host` is ``127.0.0.1``, ``localhost`` or ``::1``: this machine
-    only. With `token` a page must show the token that stands in `url`.
-    """
-
-    def __init__(self, port: int, host: str, *, strict_port: bool, token: bool) -> None:
+    def __init__(
+        self, port: int = 8080, host: str = "127.0.0.1", *, strict_port: bool = False, token: bool = True
+    ) -> None:
         self.host, self.port = host, port
         self._token = Token() if token else None
         self._wanted = (port, host, strict_port)

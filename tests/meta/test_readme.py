@@ -161,7 +161,7 @@ def exists(path: str) -> bool:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_every_path_named_exists(page: Path):
-    """A path from the root, or the last part of one: `runtime/devices/page.py`, `test_cook.py`."""
+    """A path from the root, or the last part of one: `devices/page.py`, `test_cook.py`."""
     text = code(page.read_text(encoding="utf-8"))
     named = set(re.findall(r"(?<![\w./-])(?:[\w.-]+/)*\w+\.(?:py|ts)\b", text))
     named |= set(re.findall(r"(?<![\w./-])(?:src|tests|docs|examples|benchmarks)(?:/[\w.-]+)+", text))

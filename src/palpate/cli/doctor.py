@@ -11,8 +11,8 @@ from typing import Any
 
 from palpate.cli.console import Console
 from palpate.cli.device_commands import findings_in_words
+from palpate.devices.device_search import search
 from palpate.errors import DeviceError
-from palpate.runtime.device_search import search
 from palpate.runtime.machine import Check, survey
 from palpate.runtime.timing_test import judge_timing, run_timing_test
 

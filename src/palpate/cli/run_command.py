@@ -13,9 +13,9 @@ from pathlib import Path
 from palpate.cli.console import Console
 from palpate.cli.live_table import live_table
 from palpate.cli.terminal_keys import RESUME, STOP, Keys, terminal_keys
+from palpate.devices import device_traits
 from palpate.format import share
 from palpate.runtime import LoopProcess
-from palpate.runtime.devices import device_traits
 from palpate.runtime.shared_state import State
 from palpate.runtime.touchable import Touchable, load_touchable
 from palpate.surrogates.surrogate import correction_warning

@@ -195,7 +195,7 @@ def validate_study_file(study: Path, report: bool, console: Console, traces: Seq
 def _beside_full_model(record: Study, traces: Sequence[Path], console: Console) -> list[TouchComparison]:
     if not traces:
         return []
-    from palpate.runtime.trace_file import read_trace
+    from palpate.devices.trace_file import read_trace
     from palpate.validation.full_model import compare_full_model
 
     problem = record.problem(whole=True)

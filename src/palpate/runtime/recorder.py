@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
+from palpate.devices.trace_file import TraceWriter
 from palpate.errors import DeviceError, PalpateError
 from palpate.runtime.recording import Ring
-from palpate.runtime.trace_file import TraceWriter
 
 __all__ = ["TraceRecorder", "machine_facts", "model_facts"]
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.devices.trace_file import Trace
 from palpate.errors import SolverError, UsageError
-from palpate.runtime.trace_file import Trace
 from palpate.validation.touch_comparison import TouchComparison
 
 __all__ = ["compare_full_model", "stroke_moments"]

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
+from palpate.devices.trace_file import Trace
 from palpate.errors import UsageError
 from palpate.format import plain, share
-from palpate.runtime.trace_file import Trace
 from palpate.validation.unseen_solves import ForceSamples, TouchSolves, force_jnd
 
 __all__ = ["TouchComparison", "compare_traces", "solves_beside"]

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from palpate.devices import device_traits
 from palpate.errors import UsageError
 from palpate.export.build_core import built_core
 from palpate.export.check_points import Comparison, ExportedFile, compare_body, compare_field
@@ -29,7 +30,6 @@ from palpate.export.weights_block import FIELD, WeightsBlock
 from palpate.files import write_file
 from palpate.format import script_json
 from palpate.output_files import require_outputs, with_seal
-from palpate.runtime.devices import device_traits
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import ContactBaseline, FieldSurrogate, Surrogate
 from palpate.surrogates.model_card import card_of

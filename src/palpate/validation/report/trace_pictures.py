@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.devices.trace_file import Trace
 from palpate.errors import UsageError
 from palpate.files import writing
 from palpate.format import plain, share
 from palpate.output_files import picture_metadata
-from palpate.runtime.trace_file import Trace
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.style import BLUE, INK, ORANGE, Picture, figure, picture, styled
 from palpate.validation.touch_comparison import TouchComparison

@@ -229,7 +229,7 @@ def test_errors_of_a_force_a_percent_too_large(case):
     assert row["direction"] == pytest.approx(0.0, abs=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_springs_find_the_modulus_that_made_their_data():
     true = Springs(Case("block", STUDY, file_of(), surrogate_cases._surface(STUDY)), (1.3,))
     train = true.case.training(6)

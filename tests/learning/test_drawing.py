@@ -68,6 +68,7 @@ def test_picture_of_little(h):
     assert file.getvalue().endswith(b"</svg>\n")
 
 
+@pytest.mark.full
 def test_no_window_system_is_asked_for():
     probe = (
         "import numpy as np, sys\nfrom palpate.learning import History\n"

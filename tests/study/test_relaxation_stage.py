@@ -56,7 +56,7 @@ def test_times_are_those_of_the_materials():
     assert prony_times(Study.model_validate(elastic)) == ()
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_surrogate_of_a_study_relaxes():
     study = Study.model_validate(CONTENT)
     train, _ = sweep_study(study, progress=False)

@@ -213,7 +213,7 @@ def test_a_schema_has_to_fit_the_layout():
         sweep(odd, samples=4)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_guides_own_solver_runs(tmp_path):
     guide = Path(__file__).parents[2] / "docs" / "guide" / "datasets-and-files.md"
     (program,) = re.findall(r"```python\n(.*?)```", guide.read_text(encoding="utf-8"), re.DOTALL)

@@ -37,7 +37,7 @@ def sliding():
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param(0.45, id="displacement"), pytest.param(0.4999, id="mixed", marks=pytest.mark.slow)],
+    params=[pytest.param(0.45, id="displacement"), pytest.param(0.4999, id="mixed", marks=pytest.mark.full)],
 )
 def solver(request):
     probe = SphereProbe(RADIUS, pad=PAD, stop=STOP, depth=(0.0, 0.006))

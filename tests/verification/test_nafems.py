@@ -135,7 +135,7 @@ def test_le10_thick_plate():
     assert abs(stress[0, 0]) < 0.02 * 5.38e6
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_le10_on_a_finer_mesh():
     stress = at_d(plate(element=0.15, fine=0.03), THICK)
     assert stress[1, 1] == pytest.approx(-5.38e6, rel=0.01)

@@ -129,7 +129,7 @@ def test_hardening_fades_linearly():
     assert gains[1] / gains[0] == pytest.approx(10, rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_dead_pressure_beyond_the_limit_is_refused():
     problem = tube(metal(0.4999), SurfaceTraction("left", "normal", (-1e9, 0.0)), "mixed", 3)
     assert problem.solve([-0.99 * LIMIT], dt=1.0).converged

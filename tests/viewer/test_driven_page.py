@@ -103,7 +103,7 @@ def test_sticks_have_a_dead_zone_without_a_jump(page: Page):
     np.testing.assert_allclose(np.array(got, float), wanted, atol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.timeout(180)
 def test_a_device_drives_and_the_page_stops_it(browser: Browser, keep):
     complaints: list[str] = []

@@ -220,7 +220,7 @@ def test_more_places_than_the_shared_memory_carries_are_refused(dents):
         Loop(body, object(), Shared.private(), body.workspace(0.06), Limits(8.0))
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_prints_run_in_the_real_process(file):
     with LoopProcess(file) as loop:
         space = load_touchable(file).workspace(loop.read().radius)

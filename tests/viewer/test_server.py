@@ -49,7 +49,7 @@ def script(rod: Surrogate, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
         process.kill()
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.skipif(os.name != "posix", reason="signals of a terminal are POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_serve_ends_in_good_order(script: subprocess.Popen[str], number: signal.Signals):
@@ -90,7 +90,7 @@ def test_an_unknown_device_is_a_usage_error(rod: Surrogate):
         Viewer(rod, port=0, device="gloves").start()
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_after_a_failed_start_nothing_is_left(rod: Surrogate):
     with Viewer(rod, port=0) as first:
         second = Viewer(rod, port=first.port, strict_port=True)

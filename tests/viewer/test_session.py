@@ -230,7 +230,7 @@ def test_the_end_of_the_loop_is_told_and_the_force_is_zero(rod: Surrogate, caplo
     assert "real-time process has ended" in caplog.text
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_standing_loop_is_noticed(rod: Surrogate):
     with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
         held(client, -0.3)
@@ -242,7 +242,7 @@ def test_a_standing_loop_is_noticed(rod: Surrogate):
         assert (frame.loop, frame.force) == (Loop.FROZEN, (0.0, 0.0, 0.0))
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_loop_that_stands_in_the_midst_of_a_tick_is_frozen_too(
     rod: Surrogate, monkeypatch: pytest.MonkeyPatch
 ):

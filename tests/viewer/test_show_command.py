@@ -16,7 +16,7 @@ from palpate.physics.vtu import write_pvd
 from palpate.viewer.messages import Shown
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.skipif(os.name != "posix", reason="signals of a terminal are POSIX")
 def test_a_series_is_served_until_interrupted(tmp_path: Path):
     solutions = dents(2)

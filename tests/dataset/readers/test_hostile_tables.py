@@ -96,6 +96,7 @@ def largest_memory():
     )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_file_is_refused(tmp_path, name):
     if name.endswith((".vtk", ".parquet")):

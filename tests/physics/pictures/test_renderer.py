@@ -179,6 +179,7 @@ def test_what_cannot_be_drawn_is_said(made: Made):
         plot_solution(made.with_(displacement=np.full_like(made.displacement, np.nan)))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("colour", "unit"), [("displacement", "mm"), ("von_mises", "kPa"), ("largest_strain", "%")]
 )

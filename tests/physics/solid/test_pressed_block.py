@@ -143,7 +143,7 @@ def test_a_column_extrapolates_from_depth_to_depth():
     assert all(0 < one.penetration < 0.98 * PROBE.stop for one in found)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_forms_agree_as_the_mesh_gets_finer():
     """At ν = 0.45 both have the same limit: their difference falls at least as fast as the element size."""
 

@@ -130,6 +130,7 @@ def test_a_run_goes_on_where_it_was_and_parts_join(tmp_path, monkeypatch):
         touch_data.main(["block", "--depths", "3", "--out", str(files[0])])
 
 
+@pytest.mark.full
 def test_displacements_of_a_joined_file_stay_where_more_is_joined(tmp_path):
     def part(name, role, seed):
         rng = np.random.default_rng(seed)

@@ -136,6 +136,7 @@ def test_validate_names_a_corrupt_model(palpate, copy):
     assert "small.palpate" in answer.err
 
 
+@pytest.mark.full
 def test_a_missed_target_is_exit_code_one_after_the_report_is_written(palpate, copy):
     path = copy / "study.toml"
     path.write_text(SMALL + "\n[target]\nrmse = 1e-14\n", encoding="utf-8")

@@ -96,6 +96,7 @@ def test_the_double_of_a_service_strokes_within_the_training(palpate, file, devi
     assert not given or depth == pytest.approx(0.75 * body.deepest)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("device", ["forcedimension", "openhaptics"])
 @pytest.mark.parametrize("given", [True, False], ids=["for the body", "by default"])
 def test_the_first_trial_of_a_compiled_double_stays_within_the_training(

@@ -359,6 +359,7 @@ def test_settings_by_hand_and_single_ones(wave):
     assert automatic.network_.radial == "matern-5/2"
 
 
+@pytest.mark.full
 def test_without_scikit_learn_the_way_is_told():
     probe = (
         "import sys; sys.modules['sklearn'] = None\n"

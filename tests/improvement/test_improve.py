@@ -146,6 +146,7 @@ def test_an_interrupted_batch_is_finished_first(improve, tmp_path):
     assert unseen.provenance["config_hash"] == config_hash(PressedSlab(), unseen.X)
 
 
+@pytest.mark.full
 def test_solves_that_fail_stay_out(cluster):
     problem = PressedSlab(failing=0.012)
     *_, last = pp.improve(

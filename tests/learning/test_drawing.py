@@ -59,6 +59,7 @@ def test_picture_in_axes_of_ones_own():
     assert [a.get_ylabel() for a in own.axes] == ["error", "units"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "h", [history(0), history(1), history(heldout=False)], ids=["empty", "one", "not held out"]
 )

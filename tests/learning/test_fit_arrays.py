@@ -148,6 +148,7 @@ def test_what_is_saved_comes_back(found, tmp_path):
         Fitted.load(found.network.save(tmp_path / "bare.palpate"))
 
 
+@pytest.mark.full
 def test_flat_arrays_and_lists_do(single):
     assert single.one_output
     low, high = single.interval([0.1, 0.2, 0.3])

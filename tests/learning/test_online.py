@@ -263,6 +263,7 @@ def test_a_second_sight_of_a_sample_takes_the_place_of_the_first():
     assert kept.Y[(kept.X == [0.1, 0.2]).all(axis=1)].ravel().tolist() == [3.0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "refining", [None, Refining(samples=60, keeping="latest", every=5)], ids=["filter", "refined"]
 )
@@ -290,6 +291,7 @@ def test_drift_is_followed(refining):
     assert rms(learner.network) < 0.1 * rms(frozen)
 
 
+@pytest.mark.full
 def test_memory_does_not_grow_with_the_stream():
     X, Y = shuffled(120)
     learner = Learner(INPUT, OUTPUTS, refining=Refining(samples=30, every=10), remember=50)

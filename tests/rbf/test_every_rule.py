@@ -132,6 +132,7 @@ def test_covariance_stays_symmetric_positive_definite(update):
     assert pruned >= 10
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", FORMS)
 @pytest.mark.parametrize("update", COVARIANT)
 def test_covariance_stays_positive_definite_for_every_form(name, update):

@@ -40,6 +40,7 @@ def test_curves_lie_on_the_closed_form_with_the_solves_of_their_column() -> None
         assert (np.diff(RADIUS - test.X[curve.rows, 2]) < 0).all()
 
 
+@pytest.mark.full
 def test_depths_of_one_place_are_told_from_places() -> None:
     test = columns()
     assert "The 20 solves lie over 4 places, at several depths of each." in str(validate(surrogate(), test))

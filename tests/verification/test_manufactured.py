@@ -119,6 +119,7 @@ def observed(name):
     return np.log2(errors(3, CASES[name]) / errors(6, CASES[name]))
 
 
+@pytest.mark.full
 def test_displacement_and_force_converge_as_theory_says():
     distance, slope, reaction = observed("neo-Hooke")
     assert distance == pytest.approx(K + 1, abs=0.2)

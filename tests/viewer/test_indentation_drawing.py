@@ -176,6 +176,7 @@ def test_all_points_of_the_top_may_keep_a_print_and_no_others(file, dents, tmp_p
     assert len(PageModel(load_touchable(travelling)).surface.yielding) == 0
 
 
+@pytest.mark.full
 def test_print_and_elastic_shape_together_touch_the_ball(file):
     body = load_touchable(file)
     model, elastic = PageModel(body), PageModel(touchable(touched_slab()))

@@ -68,6 +68,7 @@ def test_serve_ends_in_good_order(script: subprocess.Popen[str], number: signal.
         httpx.get(url)
 
 
+@pytest.mark.full
 def test_stopping_twice_and_a_model_in_memory(rod: Surrogate):
     viewer = Viewer(rod, port=0).start()
     assert httpx.get(viewer.url).headers["content-type"].startswith("text/html")

@@ -38,6 +38,7 @@ def test_a_series_is_served_until_interrupted(tmp_path: Path):
     assert {field.name for field in shown.fields} == {"displacement", "von Mises stress", "largest strain"}
 
 
+@pytest.mark.full
 def test_a_file_that_is_none_is_a_usage_error(tmp_path: Path):
     done = subprocess.run(
         [sys.executable, "-m", "palpate", "show", str(tmp_path / "no.vtu")],

@@ -41,6 +41,7 @@ def record(X, F, along=None):
     return Measurements(X, F, along, np.full(len(X), np.nan), 0.01 * np.arange(len(X)))
 
 
+@pytest.mark.full
 def test_an_offset_is_found_in_air_and_is_no_height():
     X, F = forces()
     heights = []

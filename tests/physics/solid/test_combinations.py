@@ -188,6 +188,7 @@ def test_a_viscoelastic_block_recovers_after_the_probe_has_gone():
     assert all(one.potential_energy > 0 for one in found[:4])
 
 
+@pytest.mark.full
 def test_a_plastic_block_keeps_a_dent():
     law = Plastic(LinearElastic(1e6, 0.35), LinearHardening(1e4, 2e4))
     probe = SphereProbe(SMALL, pad=1e8, stop=0.001)

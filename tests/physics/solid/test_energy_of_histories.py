@@ -51,6 +51,7 @@ LAWS = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("form", ["displacement", "mixed"])
 @pytest.mark.parametrize("law", LAWS)
 def test_work_is_stored_and_lost(law, form):

@@ -34,6 +34,7 @@ def problem() -> FamilyProblem:
     return FAMILY.problem(PROBE, element=0.012)
 
 
+@pytest.mark.full
 def test_a_member_answers_as_the_body_that_it_is() -> None:
     member = FAMILY.member((5e3, 0.4))
     assert member.materials["fat"].young == 5e3
@@ -84,6 +85,7 @@ def test_columns_each_belong_to_one_member() -> None:
     assert (values <= high).all()
 
 
+@pytest.mark.full
 def test_a_sweep_over_a_family_is_a_dataset_like_any() -> None:
     shape = Block((0.06, 0.06, 0.03), element=0.02)
     family = BodyFamily(Body(shape, NeoHookean(9e3, 0.4)), Varied("young", 5e3, 15e3))

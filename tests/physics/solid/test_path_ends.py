@@ -112,6 +112,7 @@ def test_a_prescribed_displacement_takes_the_body_along_from_the_start():
     assert found.iterations <= 12
 
 
+@pytest.mark.full
 def test_a_failed_solve_can_be_looked_at(solver):
     solver.reset()
     found = solver.solve((0.03, 0.03, 0.01))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+import kernels
 from system_programs import require_program
 
 # machines are shared and kernels compile on first use: time is no law here; examples are the same on every run
@@ -21,6 +23,23 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 # a run in the background of a shell ignores interrupts, and so would the programs that tests interrupt
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+LONG_FILES = Path(__file__).with_name("long_files.txt").read_text(encoding="utf-8").split()
+"""Files of tests that take longest, from the root of the repository, the longest first."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes(config: pytest.Config) -> None:
+    """Compile the kernels once, where all tests are about to run in workers and none has begun."""
+    if config.args_source is pytest.Config.ArgsSource.TESTPATHS and not config.option.collectonly:
+        config.pluginmanager.get_plugin("terminalreporter").write_line(kernels.compile_all())
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the long files first: what a worker takes last is short, and no core waits at the end."""
+    places = {name: place for place, name in enumerate(LONG_FILES)}
+    items.sort(key=lambda item: places.get(item.nodeid.partition("::")[0], len(places)))
 
 
 @pytest.fixture(scope="session")

@@ -27,10 +27,10 @@ from palpate.surrogates import (
 )
 from palpate.surrogates.memories import Indentation, IwanElements, Patches, Relaxation
 
-__all__ = ["BODIES", "body", "networks", "without_units"]
+__all__ = ["BODIES", "body", "networks", "random_network", "without_units"]
 
 
-def _random_network(inputs, seed: int, radial: str = "gaussian") -> Network:
+def random_network(inputs, seed: int, radial: str = "gaussian") -> Network:
     rng, n = np.random.default_rng(seed), len(inputs)
     low, high = np.array([[r.low, r.high] for r in inputs]).T
     return Network(
@@ -55,7 +55,7 @@ def _glued_pad() -> pp.Surrogate:
     rest = RestStiffness(np.vstack([[9.0, 0.5, 0.1, 8.0, 0.2, 7.0], rng.normal(0.0, 0.3, (5, 6))]), 2)
     powers = np.array([e for e in np.ndindex(3, 3, 3, 2, 2) if 0 < sum(e) <= 3])
     stiffens = Stiffening(rng.normal(0.0, 0.05, len(powers)), powers)
-    network = _random_network(energy.inputs, 3, "inverse-multiquadric")
+    network = random_network(energy.inputs, 3, "inverse-multiquadric")
     return pp.Surrogate(
         LearntEnergy(network, PadBaseline(rest, stiffens), region=_region(5)), meta={"name": "pad"}
     )
@@ -69,7 +69,7 @@ def _node() -> pp.Surrogate:
         pp.Range("Q", 0.0, 3.0, "N"),
     ]
     baseline = ConstantBaseline(0.05, np.array([[0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]))
-    energy = LearntEnergy(_random_network(inputs, 4, "matern-5/2"), baseline, region=_region(3))
+    energy = LearntEnergy(random_network(inputs, 4, "matern-5/2"), baseline, region=_region(3))
     return pp.Surrogate(energy, meta={"name": "node"})
 
 
@@ -83,7 +83,7 @@ def _rod() -> pp.Surrogate:
         np.array([0.0, 0.1, 0.0, 0.0]),
         np.array([inf, inf, inf, 0.3]),
     )
-    energy = LearntEnergy(_random_network(yielding_rod().inputs, 5), baseline)
+    energy = LearntEnergy(random_network(yielding_rod().inputs, 5), baseline)
     return pp.Surrogate(energy, memory=memory, meta={"name": "rod"})
 
 
@@ -153,7 +153,7 @@ def networks() -> list[Network]:
     Y = np.column_stack([np.sin(X[:, 0]) * X[:, 1], X[:, 0] ** 2, np.exp(-X[:, 1])])
     some = pp.fit(X, Y, inputs, effort=0.02, workers=1).network
     basis = np.linalg.qr(rng.normal(size=(12, 2)))[0]
-    few = _random_network(inputs, 8)
+    few = random_network(inputs, 8)
     wide = Network(
         few.inputs,
         tuple(pp.Quantity(f"y{i}") for i in range(12)),

@@ -16,7 +16,7 @@ from benchmarks.touch_studies import STUDIES
 
 ROOT = Path(__file__).parents[2]
 
-pytestmark = pytest.mark.slow  # all benchmarks run once, for all tests
+pytestmark = pytest.mark.full  # all benchmarks run once, for all tests
 
 
 def run(*arguments):

@@ -130,6 +130,7 @@ def test_a_run_goes_on_where_it_was_and_parts_join(tmp_path, monkeypatch):
         touch_data.main(["block", "--depths", "3", "--out", str(files[0])])
 
 
+@pytest.mark.full
 def test_displacements_of_a_joined_file_stay_where_more_is_joined(tmp_path):
     def part(name, role, seed):
         rng = np.random.default_rng(seed)
@@ -229,7 +230,7 @@ def test_errors_of_a_force_a_percent_too_large(case):
     assert row["direction"] == pytest.approx(0.0, abs=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_springs_find_the_modulus_that_made_their_data():
     true = Springs(Case("block", STUDY, file_of(), surrogate_cases._surface(STUDY)), (1.3,))
     train = true.case.training(6)

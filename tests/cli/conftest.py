@@ -1,12 +1,9 @@
-"""The command line in this process, and a small study carried out once."""
+"""The command line in this process, and a small study that was carried out."""
 
 from __future__ import annotations
 
 import contextlib
-import io
-import os
 from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,26 +11,7 @@ import pytest
 
 from palpate.cli import main
 from programs import one_core
-
-SMALL = """\
-name = "small"
-
-[body]
-material = "nylon"
-elements = 10
-
-[[interaction.loads]]
-name = "P"
-low = "0 N"
-high = "2 N"
-
-[sweep]
-samples = 33
-workers = 1
-
-[test]
-random = 8
-"""
+from solved import unpack
 
 
 @dataclass(frozen=True)
@@ -65,25 +43,6 @@ def palpate(capsys) -> Palpate:
 def carried_out(tmp_path_factory) -> Path:
     """Folder of a study that was swept and learnt through the command line; tests copy what they change.
 
-    What `learn` said is in `learn.out` and `learn.err`.
+    It is shipped; what `learn` said is in `learn.out` and `learn.err`.
     """
-    folder = tmp_path_factory.mktemp("study")
-    (folder / "study.toml").write_text(SMALL, encoding="utf-8")
-    here = Path.cwd()
-    os.chdir(folder)  # the default study file is the one in the present folder
-    try:
-        for command in ("sweep", "learn"):
-            out, err = io.StringIO(), io.StringIO()
-            with (
-                one_core(),
-                redirect_stdout(out),
-                redirect_stderr(err),
-                pytest.raises(SystemExit) as stop,
-            ):
-                main([command])
-            assert not stop.value.code, err.getvalue()
-        Path("learn.out").write_text(out.getvalue(), encoding="utf-8")
-        Path("learn.err").write_text(err.getvalue(), encoding="utf-8")
-    finally:
-        os.chdir(here)
-    return folder
+    return unpack("small", tmp_path_factory.mktemp("study"))

@@ -142,6 +142,7 @@ def fitted(tmp_path_factory):
     return found, found.save(tmp_path_factory.mktemp("fitted") / "fit.palpate")
 
 
+@pytest.mark.full
 def test_networks_of_arrays_answer_too(palpate, fitted):
     found, path = fitted
     words = palpate("ask", path).out
@@ -180,6 +181,7 @@ def test_histories_of_a_held_body_say_what_they_are(palpate, tmp_path):
     assert (answer.code, "does not answer at a place" in answer.err) == (2, True)
 
 
+@pytest.mark.full
 def test_what_was_suspicious_of_a_correction_is_told_again(palpate, tmp_path):
     S, X, path = model(), touches(30, 3), tmp_path / "wrong.palpate"
     measured = read_measurements(write_measurements(tmp_path / "pushed.csv", X, -S.force(X)))

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
-
-from .conftest import SMALL
+from small_study import SMALL
 
 
 def broken(folder, old: str, new: str):
@@ -75,6 +74,7 @@ def test_a_body_that_can_not_be(palpate, tmp_path, old, new, words):
         assert word in answer.err
 
 
+@pytest.mark.full
 def test_loads_outside_the_solvers_reach(palpate, tmp_path):
     path = broken(tmp_path, 'high = "2 N"', 'high = "1e9 N"')
     path.write_text(path.read_text().replace("samples = 33", "samples = 8"))
@@ -136,6 +136,7 @@ def test_validate_names_a_corrupt_model(palpate, copy):
     assert "small.palpate" in answer.err
 
 
+@pytest.mark.full
 def test_a_missed_target_is_exit_code_one_after_the_report_is_written(palpate, copy):
     path = copy / "study.toml"
     path.write_text(SMALL + "\n[target]\nrmse = 1e-14\n", encoding="utf-8")
@@ -202,6 +203,7 @@ def test_a_study_changed_after_its_sweep_is_not_learnt(palpate, copy):
         assert "not of this study's body" in answer.err
 
 
+@pytest.mark.full
 def test_solves_that_were_trained_with_do_not_pass_for_unseen(palpate, copy):
     path = copy / "study.toml"
     path.write_text(SMALL.replace("random = 8", "random = 8\nevery = 5"), encoding="utf-8")

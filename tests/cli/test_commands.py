@@ -24,8 +24,7 @@ from palpate.processes import end_by_sigterm
 from palpate.runtime import LoopReport
 from palpate.study import Study, preset_names, preset_study, read_study
 from programs import one_core
-
-from .conftest import SMALL
+from small_study import SMALL, carry_out
 
 
 def test_version_and_help(palpate):
@@ -147,14 +146,19 @@ def test_schema_describes_every_key(palpate):
     assert schema["additionalProperties"] is False
 
 
-def test_sweep_and_learn_write_what_they_say(carried_out):
-    data, random = Dataset.open(carried_out / "small.zarr"), Dataset.open(carried_out / "small-random.zarr")
+def test_sweep_and_learn_write_what_they_say_and_what_is_shipped(carried_out, tmp_path):
+    """A body that loads move, from solves to a file; the shipped folder that other tests begin with is the same."""
+    carry_out(tmp_path)
+    data, random = Dataset.open(tmp_path / "small.zarr"), Dataset.open(tmp_path / "small-random.zarr")
     assert (len(data), len(random)) == (33, 8)
     assert data.converged.all()
-    model = load(carried_out / "small.palpate")
+    model = load(tmp_path / "small.palpate")
     assert model.name == "small"
     force = model.energy.force(-data.displacement[:, -1, 1:2])
     np.testing.assert_allclose(force, data.X * [0.0, 1.0, 0.0], atol=1e-4)
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in carried_out.iterdir()}
+    shipped = load(carried_out / "small.palpate").energy.force(-data.displacement[:, -1, 1:2])
+    np.testing.assert_allclose(shipped, force, atol=1e-4)
 
 
 def test_a_finished_sweep_is_not_solved_again(palpate, carried_out):
@@ -187,6 +191,7 @@ def test_a_model_file_is_judged_by_the_test_set_beside_it(palpate, carried_out):
     assert "small on 8 unseen solves: every limit kept" in answer.out
 
 
+@pytest.mark.full
 def test_learning_again_gives_the_same_model_bit_for_bit_and_results_for_machines(
     palpate, carried_out, tmp_path
 ):
@@ -276,7 +281,7 @@ def test_the_double_of_a_library_says_how_it_is_used(palpate, c_compiler, tmp_pa
     assert "omega.3" in answer.err
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_demo_runs_both_founding_beams(tmp_path):
     command = [sys.executable, "-m", "palpate", "demo", "--folder", str(tmp_path / "d"), "--json"]
     with one_core():
@@ -337,6 +342,7 @@ def test_a_poisson_ratio_of_zero_is_an_option_too(palpate, tmp_path):
     assert "--poisson" in answer.err
 
 
+@pytest.mark.full
 def test_learning_is_watched(palpate, carried_out, tmp_path):
     folder = tmp_path / "watched"
     shutil.copytree(carried_out, folder)

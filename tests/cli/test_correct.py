@@ -72,6 +72,7 @@ def test_a_file_corrects_a_model(palpate, folder):
     assert content["left_out"]["median"] < 0.03
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("factor", "said"), [(-1.0, "Change their sign"), (1e3, "1e+03 times the model's")])
 def test_forces_that_can_hardly_be_this_bodys_are_a_failure_that_loses_nothing(palpate, folder, factor, said):
     X = touches(30, 3)
@@ -122,6 +123,7 @@ def test_a_body_with_its_shape_stays_one(palpate, folder):
     assert (answer.code, "is the model itself" in answer.err) == (2, True)
 
 
+@pytest.mark.full
 def test_standard_input_of_a_real_process(folder):
     X, F = measured()
     with started(folder, "--stdin") as process:
@@ -135,6 +137,7 @@ def test_standard_input_of_a_real_process(folder):
     assert follows(folder / "new.touch")
 
 
+@pytest.mark.full
 def test_a_pipe_that_falls_silent_ends_and_what_came_is_kept(folder):
     X, F = measured()
     with started(folder, "--stdin", "--stall", "1.5") as process:
@@ -148,6 +151,7 @@ def test_a_pipe_that_falls_silent_ends_and_what_came_is_kept(folder):
     assert follows(folder / "new.touch")
 
 
+@pytest.mark.full
 def test_a_connection_to_a_real_process(folder):
     X, F = measured()
     with started(folder, "--port", "0", "--json") as process:

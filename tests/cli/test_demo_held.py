@@ -13,7 +13,7 @@ from palpate.learning.plastic import LoadHistories
 
 
 # forty seconds on two free cores; a busy machine is no failure
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.timeout(600)
 def test_the_rod_keeps_its_limits_and_leaves_everything_behind(palpate, tmp_path: Path):
     """The files are read, not the exit code alone; they answer what was judged."""
@@ -51,6 +51,7 @@ def test_the_rod_keeps_its_limits_and_leaves_everything_behind(palpate, tmp_path
         assert page.count(f">{heading}<") == 1
 
 
+@pytest.mark.full
 def test_a_body_with_memory_has_a_study_file(palpate, tmp_path: Path):
     """The stages one by one, from a file, on few histories of a coarse beam."""
     file = tmp_path / "rod.toml"

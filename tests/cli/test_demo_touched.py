@@ -13,7 +13,7 @@ from palpate.dataset import Dataset
 from palpate.surrogates import Surrogate
 
 # a minute on two free cores; a busy machine is no failure
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.full, pytest.mark.timeout(900)]
 
 
 @pytest.fixture(scope="module")

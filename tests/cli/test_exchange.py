@@ -57,6 +57,7 @@ def test_a_model_goes_out_as_a_picture_that_moves(palpate, folder):
     assert "follows from its loads" in answer.err
 
 
+@pytest.mark.full
 def test_files_of_others_stay(palpate, folder):
     model, data = folder / "small.palpate", folder / "small.zarr"
     for words, file in (

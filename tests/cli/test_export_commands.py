@@ -37,6 +37,7 @@ def test_a_memory_without_model_exchange_is_named(palpate, tmp_path):
     assert "co-simulation alone because of the memory 'indentation'" in answer.out
 
 
+@pytest.mark.full
 def test_a_network_goes_out_as_c_alone(palpate, tmp_path):
     require_program("gcc")
     file = networks()[1].save(tmp_path / "map.palpate")
@@ -87,6 +88,7 @@ def test_names_are_those_of_the_file_and_lie_beside_it(palpate, pad, tmp_path):
     }
 
 
+@pytest.mark.full
 def test_an_export_replaces_its_own_files_and_no_others(palpate, pad, tmp_path):
     require_program("gcc")
     file = shutil.copy(pad, tmp_path / "pad.palpate")

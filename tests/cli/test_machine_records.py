@@ -178,6 +178,7 @@ def softened(strain):
     return e, np.concatenate([share * nominal(x) for x, share in parts])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("words", "share", "said"),
     [

@@ -76,6 +76,7 @@ def test_what_is_not_known_is_asked_for(palpate, tmp_path, name, head, words, to
     assert told in answer.err.replace("\n", " ")
 
 
+@pytest.mark.full
 def test_the_page_on_materials_from_tests_runs(monkeypatch):
     page = (ROOT / "docs" / "guide" / "material-from-tests.md").read_text(encoding="utf-8")
     monkeypatch.chdir(ROOT / "examples")

@@ -24,6 +24,7 @@ def stroke(metres: float) -> str:
     return f"stroke:frequency=2,amplitude={metres / scale:.6f}"
 
 
+@pytest.mark.full
 def test_a_stroke_within_the_training_is_told_as_such(palpate, file):
     answer = palpate("run", file, "--seconds", "1", "--device", stroke(0.004), "--json")
     assert answer.code == 0, answer.err
@@ -32,6 +33,7 @@ def test_a_stroke_within_the_training_is_told_as_such(palpate, file):
     assert told["outside"] == told["let_go"] == 0.0
 
 
+@pytest.mark.full
 def test_a_stroke_through_the_body_tells_how_long_it_was_let_go(palpate, file):
     deep = slab.RADIUS + slab.face().inner
     answer = palpate("run", file, "--seconds", "1", "--device", stroke(1.5 * deep), "--json")
@@ -43,6 +45,7 @@ def test_a_stroke_through_the_body_tells_how_long_it_was_let_go(palpate, file):
     assert "so deep that the body let go for" in words
 
 
+@pytest.mark.full
 def test_the_warning_of_a_correction_is_told_again(palpate, tmp_path):
     meta = {"name": "slab", "correction": {"counts": {"learnt": 3}, "warning": "Change their sign."}}
     wrong = slab.surrogate(meta=meta).save(tmp_path / "wrong.palpate")
@@ -58,6 +61,7 @@ def test_a_pad_is_pulled_by_the_script(palpate, tmp_path):
     assert "mm from rest" in answer.out
 
 
+@pytest.mark.full
 def test_a_body_too_stiff_for_its_device_is_softened_and_that_is_told(palpate, tmp_path):
     stiff = slab.surrogate(factor=50.0).save(tmp_path / "stiff.palpate")
     device = "simulated:delay=0.004,damping=0.3,shape=press"
@@ -92,6 +96,7 @@ def test_the_double_of_a_service_strokes_within_the_training(palpate, file, devi
     assert not given or depth == pytest.approx(0.75 * body.deepest)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("device", ["forcedimension", "openhaptics"])
 @pytest.mark.parametrize("given", [True, False], ids=["for the body", "by default"])
 def test_the_first_trial_of_a_compiled_double_stays_within_the_training(

@@ -27,7 +27,7 @@ def study(tmp_path):
     return path
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.timeout(300)
 def test_solves_are_chosen_until_the_error_is_kept(palpate, study, tmp_path):
     first = palpate("sweep", study, "--until", "60%", "--json")

@@ -55,6 +55,7 @@ def test_a_table_is_learnt_in_si_units_by_the_names_of_its_columns(learnt):
     np.testing.assert_allclose(found.predict(table), force / 1e3, atol=0.05)
 
 
+@pytest.mark.full
 def test_fit_says_what_it_left_out_and_what_it_lacks(palpate, bench, learnt, tmp_path):
     words = (
         "fit",

@@ -152,6 +152,7 @@ def test_a_page_can_not_start_work_that_has_begun(study):
     assert not chosen
 
 
+@pytest.mark.full
 def test_the_work_on_a_part_begins_once(tmp_path):
     """A second start is refused before its study is written; one that fails has not begun."""
     touched = TouchedPart(0.02, 60.0, 1, Console())
@@ -203,7 +204,7 @@ def lines_until(process: subprocess.Popen, words: str, seconds: float = 240.0) -
     raise AssertionError("".join(lines))
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.timeout(300)
 def test_a_part_is_touched_while_it_is_solved(tmp_path):
     """The real command on a small block: page, work, first touch, Ctrl-C, and nothing is left behind."""

@@ -46,6 +46,7 @@ def trace(folder, file):
     return path
 
 
+@pytest.mark.full
 def test_a_run_says_what_it_recorded_and_the_trace_knows_it(palpate, file, trace, tmp_path):
     told = json.loads(palpate("trace", "info", trace, "--json").out)
     assert told["complete"]

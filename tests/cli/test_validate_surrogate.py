@@ -36,6 +36,7 @@ def test_a_good_surrogate_is_told_from_its_file_and_passes(palpate, folder):
     assert page.count("<svg") == 5
 
 
+@pytest.mark.full
 def test_a_miss_is_exit_code_one_in_plain_words(palpate, folder):
     surrogate(factor=1.1).save(folder / "wrong.palpate")
     answer = palpate(
@@ -53,6 +54,7 @@ def test_a_miss_is_exit_code_one_in_plain_words(palpate, folder):
     assert not (folder / "wrong.html").exists()
 
 
+@pytest.mark.full
 def test_what_was_corrected_to_a_specimen_is_said_to_differ_on_purpose(palpate, folder):
     stiffer = surrogate(factor=1.1)
     replace(stiffer, meta=stiffer.meta | {"correction": {"counts": {"learnt": 30}}}).save(
@@ -67,6 +69,7 @@ def test_what_was_corrected_to_a_specimen_is_said_to_differ_on_purpose(palpate, 
     assert "more solves" not in answer.err
 
 
+@pytest.mark.full
 def test_refined_solves_tell_the_mesh_s_own_error(palpate, folder):
     X = places()[:60]
     fine = TouchSolves(X, 1.02 * force(X), np.zeros(60), np.zeros((60, 3, 3)))

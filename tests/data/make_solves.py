@@ -1,9 +1,9 @@
-"""Solve the datasets that tests learn from, and pack each into one file beside this one.
+"""Solve and learn what tests begin with, and pack each into one file beside this one.
 
-    python tests/data/make_solves.py            both
+    python tests/data/make_solves.py            all
     python tests/data/make_solves.py family     one of them
 
-A minute on one core. `tests/dataset/test_shipped_solves.py` solves a row of each again and compares.
+A minute on one core. `tests/dataset/test_shipped_solves.py` makes a part of each again and compares.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import palpate as pp
@@ -42,14 +43,25 @@ SOLVED: dict[str, Callable[[], tuple[SolidProblem, int, int]]] = {"block": block
 
 
 def main(*names: str) -> None:
-    for name in names or tuple(SOLVED):
-        problem, samples, seed = SOLVED[name]()
-        data = pp.sweep(problem, samples=samples, seed=seed, workers=1, progress=False)
-        with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(FOLDER / f"{name}.zip", "w") as packed:
-            store = data.save(Path(folder) / "solves.zarr")
-            for file in sorted(p for p in store.rglob("*") if p.is_file()):
-                entry = zipfile.ZipInfo(file.relative_to(store).as_posix())
-                packed.writestr(entry, file.read_bytes(), zipfile.ZIP_DEFLATED, compresslevel=9)
+    for name in names or (*SOLVED, "small"):
+        with tempfile.TemporaryDirectory() as place:
+            folder = Path(place)
+            if name == "small":
+                sys.path.insert(0, str(FOLDER.parent))
+                import_module("small_study").carry_out(folder)
+            else:
+                problem, samples, seed = SOLVED[name]()
+                data = pp.sweep(problem, samples=samples, seed=seed, workers=1, progress=False)
+                folder = data.save(folder / "solves.zarr")
+            pack(folder, FOLDER / f"{name}.zip")
+
+
+def pack(folder: Path, target: Path) -> None:
+    """Write all files of a folder into one, the same bytes for the same files."""
+    with zipfile.ZipFile(target, "w") as packed:
+        for file in sorted(p for p in folder.rglob("*") if p.is_file()):
+            entry = zipfile.ZipInfo(file.relative_to(folder).as_posix())
+            packed.writestr(entry, file.read_bytes(), zipfile.ZIP_DEFLATED, compresslevel=9)
 
 
 if __name__ == "__main__":

@@ -282,6 +282,7 @@ def test_saturated_motors_are_counted_and_keep_the_direction(dhd, device):
     assert "saturated 4 times" in device.note
 
 
+@pytest.mark.full
 def test_a_process_touches_through_the_library_and_reports_saturation(double, spring_file):
     library = double("forcedimension", MOTOR_FORCE=0.001, FREQUENCY=1.5, AMPLITUDE=0.02)
     with LoopProcess(spring_file, device=f"forcedimension:library={library}") as loop:

@@ -58,7 +58,7 @@ def test_conventions(estimator, check):
 CHOOSING = RBFNetworkRegressor(form="auto", target=0.9, effort=0.02, random_state=0)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.usefixtures("array_api")
 @pytest.mark.filterwarnings("ignore:The network predicts no better")  # some checks fit noise
 def test_conventions_of_a_form_that_is_chosen():
@@ -70,6 +70,7 @@ def test_conventions_of_a_form_that_is_chosen():
     assert done > 45
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("model", BOTH)
 def test_grid_search_pipeline_and_cross_validation(model, wave):
     X, y = wave
@@ -84,6 +85,7 @@ def test_grid_search_pipeline_and_cross_validation(model, wave):
     assert search.cv_results_["mean_test_score"][0] < search.best_score_ - 0.05
 
 
+@pytest.mark.full
 def test_automatic_settings_in_a_pipeline(wave):
     X, y = wave
     model = MRANRegressor(target=0.1, random_state=0)
@@ -114,6 +116,7 @@ def test_form_and_kernel_by_trial(wave):
     ).any()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("model", BOTH)
 def test_shape_of_y_comes_back(model, wave):
     X, y = wave
@@ -123,6 +126,7 @@ def test_shape_of_y_comes_back(model, wave):
     assert model.fit(X, np.vstack([y, y, y]).T).predict(X[:5]).shape == (5, 3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("model", BOTH)
 def test_outputs_of_different_size_are_learnt_alike(model, wave):
     X, y = wave
@@ -146,6 +150,7 @@ def test_constant_columns_survive(model, wave):
     np.testing.assert_allclose(clone(model).fit(wide, np.full(len(y), 3.0)).predict(wide[:4]), 3.0)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("model", BOTH)
 def test_order_of_rows_does_not_matter_and_the_seed_decides(model, wave):
     X, y = wave
@@ -166,6 +171,7 @@ def test_equal_rows_become_one():
     np.testing.assert_allclose(weights, [1.0, 1.0])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("model", BOTH)
 def test_a_heavy_sample_is_met_more_closely(model, wave):
     X, y = wave
@@ -179,6 +185,7 @@ def test_a_heavy_sample_is_met_more_closely(model, wave):
     assert abs(drawn[0]) < 0.75 * abs(even[0])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("batch", [1, 7, 80])
 @pytest.mark.parametrize("settings", ["default", "shared", "emran", "ran", None])
 def test_batches_are_one_pass_to_the_last_bit(batch, settings, wave):
@@ -249,6 +256,7 @@ def interval_share(model, X, y):
     return (np.abs(predicted - y) <= 1.645 * deviation).mean()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("form", [None, "auto"])
 @pytest.mark.parametrize("size", [1e-6, 1e6])
 def test_deviations_hold_nine_in_ten(form, size):
@@ -351,6 +359,7 @@ def test_settings_by_hand_and_single_ones(wave):
     assert automatic.network_.radial == "matern-5/2"
 
 
+@pytest.mark.full
 def test_without_scikit_learn_the_way_is_told():
     probe = (
         "import sys; sys.modules['sklearn'] = None\n"

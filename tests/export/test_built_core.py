@@ -32,6 +32,7 @@ def test_a_body_whose_network_has_no_units_states_its_deviation():
     np.testing.assert_allclose(core.answers(X)[:, 19], model.energy.deviation(X), rtol=1e-5)
 
 
+@pytest.mark.full
 def test_weights_that_are_not_sound_are_refused():
     block = block_of(body("contact"), field=None, with_field=False, deviation=True).to_bytes()
     WasmCore(block)

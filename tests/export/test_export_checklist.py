@@ -30,7 +30,8 @@ from palpate.surrogates import LearntEnergy
 from palpate.surrogates.memories import Memory, MemoryState
 from system_programs import require_program
 
-SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+# what optimisation would remove is looked at too; other exporters here are optimised
+SANITIZED = ("-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
 def c_with(compiler: str, *options: str, single: bool = False) -> Callable[[pp.Surrogate, Path], Comparison]:
@@ -83,11 +84,17 @@ EXPORTERS = {
 }
 ON_ALL = ("gcc", "float", "page", "onnx")  # the others on two bodies: the sources are the same
 ON_SOME = ("relaxation", "pad")
+PLAIN = {("gcc", "relaxation"), ("lib", "pad"), ("page", "relaxation"), ("onnx", "pad")}
 
 
 @pytest.mark.parametrize(
     ("exporter", "name"),
-    [(e, b) for e in EXPORTERS for b in BODIES if e in ON_ALL or b in ON_SOME],
+    [
+        pytest.param(e, b, marks=[] if (e, b) in PLAIN else pytest.mark.full)
+        for e in EXPORTERS
+        for b in BODIES
+        if e in ON_ALL or b in ON_SOME
+    ],
 )
 def test_an_export_answers_as_palpate_does(exporter, name, tmp_path):
     thing = body(name)
@@ -102,6 +109,7 @@ def test_an_export_answers_as_palpate_does(exporter, name, tmp_path):
     assert compared.parts["energy"].count > 900
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("compiler", ["gcc", "tcc"])
 def test_networks_alone_go_out(compiler, tmp_path):
     path = require_program(compiler)
@@ -114,6 +122,7 @@ def test_networks_alone_go_out(compiler, tmp_path):
         )
 
 
+@pytest.mark.full
 def test_compilers_agree_to_the_last_bit(tmp_path):
     thing = body("indentation")
     done = export_c(thing, tmp_path, check=False)
@@ -158,6 +167,7 @@ def test_what_has_no_c_source_is_refused_by_name(tmp_path):
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.full
 def test_a_baseline_of_ones_own_goes_out_as_the_guide_says(tmp_path):
     from test_new_kind import MEETS, RANGES, SpringBed
 

@@ -71,8 +71,9 @@ def from_fmu(thing, folder):
 EXPORTS = {"c": from_gcc, "wasm": from_wasm, "onnx": from_onnx, "fmu": from_fmu}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("export", EXPORTS)
-@pytest.mark.parametrize("name", ["iwan", "pad", pytest.param("contact", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["iwan", "pad", pytest.param("contact", marks=pytest.mark.full)])
 def test_what_has_no_answer_pushes_nobody_and_is_flagged(export, name, tmp_path):
     """A probe that is far away touches nothing, which is an answer; what is held and far away has none."""
     thing = elastic(name)
@@ -274,6 +275,7 @@ def test_damping_is_against_the_velocity_and_its_derivatives_are_true(name, vers
 ROWLESS = [(name, single) for name in BODIES for single in (False, True) if not single or name in ELASTIC]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("name", "single"), ROWLESS)
 def test_a_batch_of_no_rows_has_answers_of_no_rows(name, single, tmp_path):
     thing = elastic(name)
@@ -284,6 +286,7 @@ def test_a_batch_of_no_rows_has_answers_of_no_rows(name, single, tmp_path):
         assert value.shape == (0, *output.shape[1:]), output.name
 
 
+@pytest.mark.full
 def test_networks_alone_take_a_batch_of_no_rows(tmp_path):
     for network in networks():
         export_onnx(network, tmp_path / "map.onnx", check=False, overwrite=True)
@@ -304,8 +307,8 @@ def test_nodes_are_named_by_what_they_work_out(tmp_path):
     }
 
 
-@pytest.mark.parametrize("compiler", ["g++", pytest.param("clang++", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", ["contact", "iwan", pytest.param("relaxation", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("compiler", ["g++", pytest.param("clang++", marks=pytest.mark.full)])
+@pytest.mark.parametrize("name", ["contact", "iwan", pytest.param("relaxation", marks=pytest.mark.full)])
 @pytest.mark.parametrize("single", [False, True])
 def test_the_header_and_the_files_are_cpp_too(compiler, name, single, tmp_path):
     path = require_program(compiler)
@@ -328,8 +331,9 @@ def test_a_program_in_cpp_calls_a_library_in_c(tmp_path):
     assert subprocess.run([program], capture_output=True, text=True, check=True).stdout.count(" N") == 11
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("single", [False, True])
-@pytest.mark.parametrize("name", ["contact", "network", pytest.param("relaxation", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["contact", "network", pytest.param("relaxation", marks=pytest.mark.full)])
 def test_the_stack_is_smaller_than_the_header_says(name, single, tmp_path):
     """All frames of the core together are more than any chain of calls takes: nothing calls itself."""
     gcc = require_program("gcc")

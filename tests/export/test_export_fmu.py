@@ -116,6 +116,7 @@ def host(tmp_path_factory):
     return folder / "host"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", ["contact", "relaxation", "indentation", "pad"])
 def test_legal_and_illegal_orders_under_sanitizers(name, version, host, files, tmp_path):

@@ -375,6 +375,7 @@ def test_a_network_has_a_card_too():
     assert "not checked" in " ".join(card.warnings)
 
 
+@pytest.mark.full
 def test_the_card_of_a_fit_says_what_its_file_says(tmp_path):
     X = np.linspace(-1.0, 1.0, 60)
     fitted = Fitted.load(palpate.fit(X, np.sin(2 * X), effort=0.01).save(tmp_path / "sine.palpate"))

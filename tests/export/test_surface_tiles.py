@@ -189,6 +189,7 @@ def ask(reader: Path, kind: str, questions: list[bytes]) -> bytes:
     return done.stdout
 
 
+@pytest.mark.full
 def test_tables_of_any_size_and_width_come_back_from_c(reader):
     rng, tables = np.random.default_rng(3), []
     for width in range(26):
@@ -264,6 +265,7 @@ def _tetrahedron() -> tuple[np.ndarray, np.ndarray]:
     return points, np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["raised", "from before"])
 def test_raised_and_older_surfaces_go_out_too(name, tmp_path):
     compiler = require_program("gcc")

@@ -66,6 +66,7 @@ def test_steps_solve_learn_and_judge_in_turn(improve):
     assert not seen & unseen
 
 
+@pytest.mark.full
 def test_a_family_in_the_probes_radius_is_improved(cluster):
     """Solves state no slope of the energy by the radius: they count all the same, and radii are chosen, too."""
     family = PressedByAnySize()
@@ -91,6 +92,7 @@ def test_it_ends_when_the_error_is_kept_on_all_unseen_solves(improve):
     assert (last.solves, last.unseen) == (FIRST, 10)
 
 
+@pytest.mark.full
 def test_a_surrogate_that_misses_begins_the_row_anew(improve):
     """Surrogates of 12 and 20 solves are seven times too stiff; the one of 16, which stays in the hand, counts once."""
 
@@ -108,6 +110,7 @@ def test_a_surrogate_that_misses_begins_the_row_anew(improve):
     assert share(steps[-1].error) in steps[-1].reason
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("rule", RULES)
 def test_every_rule_chooses_new_places(improve, rule):
     *_, last = improve(until=1e-4, most=FIRST + 4, rule=rule)
@@ -118,6 +121,7 @@ def test_every_rule_chooses_new_places(improve, rule):
     assert last.train.response == pytest.approx(truth(X)[1])
 
 
+@pytest.mark.full
 def test_an_interrupted_batch_is_finished_first(improve, tmp_path):
     files = {"path": tmp_path / "slab.zarr", "unseen_path": tmp_path / "slab-random.zarr"}
 
@@ -142,6 +146,7 @@ def test_an_interrupted_batch_is_finished_first(improve, tmp_path):
     assert unseen.provenance["config_hash"] == config_hash(PressedSlab(), unseen.X)
 
 
+@pytest.mark.full
 def test_solves_that_fail_stay_out(cluster):
     problem = PressedSlab(failing=0.012)
     *_, last = pp.improve(
@@ -152,6 +157,7 @@ def test_solves_that_fail_stay_out(cluster):
     assert last.solves < 24
 
 
+@pytest.mark.full
 def test_another_bodys_solves_are_refused(improve, tmp_path):
     path = tmp_path / "slab.zarr"
     next(iter(improve(path=path)))

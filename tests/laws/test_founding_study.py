@@ -17,7 +17,7 @@ from palpate.learning import Settings, default, founding, learn, refined_network
 from palpate.physics.beam.beam_presets import preset
 from palpate.units import Quantity
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.full
 SEEDS = (0, 1, 2)
 TIGHT_SEEDS = (0, 1)  # a tightened filter grows many units: each run takes as long as four others
 

@@ -13,7 +13,7 @@ import pytest
 from benchmarks.literature import franke, hermite, mackey_glass, plant
 from benchmarks.literature.protocol import filtered, linear, refined, rms, scores, streamed
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.full
 
 
 def middle(found):

@@ -7,7 +7,7 @@ from benchmarks.cases import case
 from benchmarks.online import RATIO, at_once, streamed, streams
 from benchmarks.stability import REGRESSION, run
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.full, pytest.mark.timeout(600)]
 
 
 # three and six inputs take longer: `python -m benchmarks.online` has them, and claims the same

@@ -60,6 +60,7 @@ def test_spacing_of_a_grid():
     assert spacing(grid[:1]) == 0.0
 
 
+@pytest.mark.full
 def test_a_tighter_target_takes_finer_steps_and_is_reached():
     X, Y = bump()
     inputs, outputs = ranges_of(X), named(Y)
@@ -92,6 +93,7 @@ def test_a_reached_target_and_a_missed_one_are_told():
     assert learn(X, Y, inputs, outputs, settings=reached.settings, passes=1).reached  # nothing was asked
 
 
+@pytest.mark.full
 def test_noise_is_named_as_the_limit():
     X, Y = bump(100, 0.3)
     told = learn(X, Y, ranges_of(X), named(Y), target=1e-3)

@@ -65,12 +65,14 @@ def bump_fit():
     return fit(*data[:2], INPUTS, OUTPUTS, effort=0.25), data
 
 
+@pytest.mark.full
 def test_ridges_are_learnt_by_ridges(ridge_fit):
     found, (X, Y, X_test, Y_test) = ridge_fit
     assert found.form == "rank-1"
     assert relative(found, X_test, Y_test, Y) < 0.2 * cubic_error(X, Y, X_test, Y_test)
 
 
+@pytest.mark.full
 def test_rotated_bumps_are_not(bump_fit):
     found, (X, Y, X_test, Y_test) = bump_fit
     assert found.form in {"rotated", "rank-2"}
@@ -83,6 +85,7 @@ def test_heldout_error_tells_the_test_error_roughly(which, request):
     assert 1 / 4 < relative(found, X_test, Y_test, Y) / found.heldout < 4
 
 
+@pytest.mark.full
 def test_seed_decides_everything():
     X, Y, _, _ = samples(ridges, count=80)
     one, two = (fit(X, Y, INPUTS, OUTPUTS, effort=0.05, seed=3, workers=w) for w in (1, 2))
@@ -93,6 +96,7 @@ def test_seed_decides_everything():
     assert [t.error for t in other.trials] != [t.error for t in one.trials]
 
 
+@pytest.mark.full
 def test_noise_is_not_learnt():
     X, _, X_test, _ = samples(ridges)
     noise = np.random.default_rng(5).normal(size=(len(X), 4))
@@ -120,6 +124,7 @@ def test_affine_outputs_need_no_units():
     np.testing.assert_allclose(found.network.predict(X_test), X_test @ slopes + 3, rtol=1e-9)
 
 
+@pytest.mark.full
 def test_many_outputs_of_few_modes_go_through_a_basis(ridge_fit):
     X, Y, X_test, Y_test = ridge_fit[1]
     many = np.random.default_rng(0).normal(size=(4, 200))
@@ -211,6 +216,7 @@ def test_an_ensemble_is_the_mean_of_its_members_and_errs_no_more_than_they_on_av
     assert ((together - yt) ** 2).mean() <= squares
 
 
+@pytest.mark.full
 def test_what_is_handed_over_is_about_as_good_as_the_best_that_was_tried():
     """A mean must not be spoilt by members that were caught in another minimum."""
     X = np.random.default_rng(0).uniform(-1, 1, (60, 2))

@@ -35,6 +35,7 @@ def error(X, function):
     return np.sqrt(((palpate.fit(X, function(X), effort=0.02).predict(Z) - function(Z)) ** 2).mean())
 
 
+@pytest.mark.full
 def test_close_triples_teach_no_less_than_their_centres():
     centres = box(100, 2)
     alone = error(centres, camel)

@@ -59,6 +59,7 @@ def test_picture_in_axes_of_ones_own():
     assert [a.get_ylabel() for a in own.axes] == ["error", "units"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "h", [history(0), history(1), history(heldout=False)], ids=["empty", "one", "not held out"]
 )
@@ -68,6 +69,7 @@ def test_picture_of_little(h):
     assert file.getvalue().endswith(b"</svg>\n")
 
 
+@pytest.mark.full
 def test_no_window_system_is_asked_for():
     probe = (
         "import numpy as np, sys\nfrom palpate.learning import History\n"

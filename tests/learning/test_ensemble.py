@@ -64,6 +64,7 @@ def answers(found, X):
     return np.hstack([of.tail_rows(X), of.phi(X, found.theta)]) @ found.coefficients
 
 
+@pytest.mark.full
 def test_a_mean_answers_what_its_networks_do_on_average(mean):
     found = mean(4)
     assert found.networks > 1

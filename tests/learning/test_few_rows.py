@@ -45,6 +45,7 @@ def box(count, inputs, seed=0):
     return np.random.default_rng([seed, count, inputs]).uniform(-1, 1, (count, inputs))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("count", [25, 40])
 def test_what_is_stated_of_few_rows_holds(count):
     """Of three functions most new values are inside, and errors are stated to a factor of two.
@@ -66,6 +67,7 @@ def test_what_is_stated_of_few_rows_holds(count):
     assert 0.5 < np.exp(np.mean(np.log(ratios))) < 2.0
 
 
+@pytest.mark.full
 def test_the_mean_wins_where_few_rows_of_many_inputs_say_nothing():
     excess = []
     for seed in range(3):
@@ -78,6 +80,7 @@ def test_the_mean_wins_where_few_rows_of_many_inputs_say_nothing():
     assert np.median(excess) < 1.03
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("inputs", [1, 2])
 def test_beside_a_kink_answers_are_not_trusted(inputs, tmp_path):
     direction = np.array([1.0, 0.3])[:inputs]
@@ -95,6 +98,7 @@ def test_beside_a_kink_answers_are_not_trusted(inputs, tmp_path):
     assert max(worst) < 0.01
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("step", [1e-3, 1e-6])
 def test_close_triples_teach_no_less_than_their_centres(step):
     centres, Z = box(30, 2), box(1000, 2, 9)

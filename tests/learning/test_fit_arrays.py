@@ -45,6 +45,7 @@ def covered(found, X, Y, level=None):
     return ((low <= Y) & (high >= Y)).mean(axis=0)
 
 
+@pytest.mark.full
 def test_intervals_hold_nine_in_ten_of_unseen_samples(found):
     share = covered(found, *noisy(4000, seed=1))
     assert share.mean() == pytest.approx(0.9, abs=0.05)
@@ -54,6 +55,7 @@ def test_intervals_hold_nine_in_ten_of_unseen_samples(found):
     assert narrow.mean() == pytest.approx(0.5, abs=0.1)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("noise", [0.0, 0.2])
 def test_intervals_of_few_samples_are_rather_too_wide(noise):
     shares = [
@@ -62,6 +64,7 @@ def test_intervals_of_few_samples_are_rather_too_wide(noise):
     assert np.mean(shares) > 0.85
 
 
+@pytest.mark.full
 def test_another_level_is_calibrated_for():
     found = palpate.fit(*noisy(300), effort=0.07, level=0.6)
     share = covered(found, *noisy(4000, seed=1))
@@ -145,6 +148,7 @@ def test_what_is_saved_comes_back(found, tmp_path):
         Fitted.load(found.network.save(tmp_path / "bare.palpate"))
 
 
+@pytest.mark.full
 def test_flat_arrays_and_lists_do(single):
     assert single.one_output
     low, high = single.interval([0.1, 0.2, 0.3])
@@ -251,6 +255,7 @@ def test_masked_numbers_are_missing_numbers():
         palpate.fit(X, Y, effort=0.03)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("count", [200, 20_000])
 def test_a_limit_on_time_plans_for_less_work_however_many_rows(count, monkeypatch):
     """The processor's time counts, not the clock's, so that other work on the machine has no say."""
@@ -275,6 +280,7 @@ def tabular():
     return table, palpate.fit(table, 0.1 * table["depth"] + 5 * table["speed"] ** 2, effort=0.02)
 
 
+@pytest.mark.full
 def test_columns_of_a_table_are_matched_by_name(tabular, tmp_path):
     table, found = tabular
     straight, turned = found.predict(table), table[["speed", "depth"]]
@@ -290,6 +296,7 @@ def test_columns_of_a_table_are_matched_by_name(tabular, tmp_path):
             again.predict(table.assign(time=0.0))
 
 
+@pytest.mark.full
 def test_declared_inputs_are_matched_to_the_columns_of_their_name(tabular):
     table, found = tabular
     y = found.predict(table)

@@ -52,6 +52,7 @@ def test_many_outputs_are_learnt_through_few_modes():
     assert error < 0.1 * np.linalg.norm(truth @ wide)
 
 
+@pytest.mark.full
 def test_slopes_in_physical_units_help():
     """A force is the slope of an energy: ten energies with their forces say more than ten energies."""
     X, Y, slopes = bowl(12)

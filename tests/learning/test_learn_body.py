@@ -196,7 +196,7 @@ def test_too_many_images_are_thinned_by_whole_columns():
     assert sum(counts) < 100
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_body_is_learnt_judged_and_kept(tmp_path):
     """The lines of the first page on a body known by formula: learn, validate, save, load."""
     body, probe = block()
@@ -264,6 +264,7 @@ def test_data_without_energies_is_refused():
         pp.learn(Dataset(data.data.drop_vars("potential_energy")))
 
 
+@pytest.mark.full
 def test_a_beam_is_still_learnt_as_a_beam():
     beam = pp.Cantilever(1.0, pp.Circle(0.005), pp.named_material("nylon"), elements=6)
     data = sweep(beam, pp.TipLoad(0.0, 1.0), samples=9, design="grid", workers=1, progress=False)
@@ -272,7 +273,7 @@ def test_a_beam_is_still_learnt_as_a_beam():
     assert touch.energy.baseline.holds
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_family_of_bodies_is_learnt_as_one():
     """Elements of a body and of its family: modulus and probe's radius become inputs of what is touched."""
     data = solved("family")

@@ -321,7 +321,7 @@ def sized(count, seed):
     return np.c_[X, R], energy_of(X, R), np.stack([*F, -by_radius], axis=1), np.full_like(K, np.nan)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_probes_radius_may_be_an_input(surface):
     X, U, response, K = sized(80, 5)
     inputs = (*INPUTS[:2], Range("z", 0.002, 0.010, "m"), Range("R", 0.008, 0.010, "m"))

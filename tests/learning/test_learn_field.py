@@ -158,6 +158,7 @@ def test_rigid_fields_whose_coefficients_are_affine_are_found_exactly(face):
     assert learnt.learning_left_out < 1e-8
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("components", [1, 3])
 def test_a_dimple_alone_needs_no_modes(face, components):
     """A field that is the same everywhere in the probe's frame is shown by the moving part, where modes fail."""
@@ -197,6 +198,7 @@ def test_a_dimple_alone_needs_no_modes(face, components):
     assert errors[0] < 0.1 * errors[1]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("components", [1, 3])
 def test_a_dimple_that_differs_from_place_to_place_is_learnt(face, components):
     """It leans towards the middle and grows sideways by a quarter: what travels unchanged misses that."""
@@ -275,6 +277,7 @@ def test_a_dimple_fades_to_nothing_at_its_reach():
     assert np.abs(after - window[:, None, None, None, None] * before).max() < 3e-4 * np.abs(before).max()
 
 
+@pytest.mark.full
 def test_what_travels_is_learnt_at_the_nodes_that_it_was_solved_on(face):
     """A local mode as narrow as two elements, on three meshes: carried from node to node it loses its flank."""
     points, triangles, surface = face

@@ -57,6 +57,7 @@ def test_few_solves_of_a_symmetric_body_teach_its_force_and_stiffness():
     assert validation.border_loops.max < 1e-9
 
 
+@pytest.mark.full
 def test_images_of_a_solve_get_images_of_its_force(square):
     S, X = square[0], drawn(30, seed=4)
     for M in SQUARE:

@@ -135,6 +135,7 @@ def test_rows_at_few_places_are_dealt_one_by_one(places):
     assert len(parts.learn) == 9600
 
 
+@pytest.mark.full
 def test_all_rows_make_a_better_network_than_some(many):
     fitted, X, y = many
     asked, _ = rows_of(4000, seed=9)
@@ -162,6 +163,7 @@ def test_a_plane_of_many_rows_has_no_units():
     assert fitted.heldout < 1e-9
 
 
+@pytest.mark.full
 def test_the_error_of_a_rough_target_is_told():
     X, _ = rows_of(12_000)
     rough = np.sign(np.sin(9.0 * X[:, 0]) * np.sin(9.0 * X[:, 1])) + 0.1 * X[:, 2]

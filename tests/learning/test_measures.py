@@ -40,6 +40,7 @@ def test_a_problem_is_the_same_in_any_unit(unit):
     np.testing.assert_allclose(there.scaling.output_scale / unit, here.scaling.output_scale, rtol=1e-12)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("unit", [1e-200, 1e200])
 def test_thresholds_are_the_same_in_any_unit(unit):
     given = automatic(X, unit * Y, target=0.3, passes=1)

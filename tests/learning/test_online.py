@@ -76,6 +76,7 @@ def test_scaling_from_the_first_observations_and_from_declared_ranges():
     np.testing.assert_allclose(declared.output_scale, 3.0)
 
 
+@pytest.mark.full
 def test_refinement_continues_the_filter_far_below_its_own_error():
     X, Y = shuffled()
     settings = replace(default(), units_max=4, error_rms_min=1e-8)
@@ -90,6 +91,7 @@ def test_refinement_continues_the_filter_far_below_its_own_error():
     np.linalg.cholesky(better.state.covariance.matrix)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("update", ["full", "decoupled", "shared"])
 def test_ends_within_three_times_the_batch_error_at_equal_units(update):
     X, Y = shuffled()
@@ -106,6 +108,7 @@ def test_ends_within_three_times_the_batch_error_at_equal_units(update):
     assert misses(learner) < 3.0 * np.sqrt(((batch - Y) ** 2).mean())
 
 
+@pytest.mark.full
 def test_seed_decides_every_bit():
     X, Y = shuffled(150)
     refining = Refining(samples=40, every=5)
@@ -260,6 +263,7 @@ def test_a_second_sight_of_a_sample_takes_the_place_of_the_first():
     assert kept.Y[(kept.X == [0.1, 0.2]).all(axis=1)].ravel().tolist() == [3.0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "refining", [None, Refining(samples=60, keeping="latest", every=5)], ids=["filter", "refined"]
 )
@@ -287,6 +291,7 @@ def test_drift_is_followed(refining):
     assert rms(learner.network) < 0.1 * rms(frozen)
 
 
+@pytest.mark.full
 def test_memory_does_not_grow_with_the_stream():
     X, Y = shuffled(120)
     learner = Learner(INPUT, OUTPUTS, refining=Refining(samples=30, every=10), remember=50)
@@ -324,6 +329,7 @@ print(seen)
 """
 
 
+@pytest.mark.full
 def test_a_reader_in_another_process_sees_whole_snapshots():
     X, Y = shuffled(60)
     learner = Learner(INPUT, OUTPUTS, scaling=Scaling.of(INPUT, Y), refining=None)
@@ -356,6 +362,7 @@ def test_a_reader_in_another_process_sees_whole_snapshots():
     assert int(out) >= 1
 
 
+@pytest.mark.full
 def test_an_idle_sensor_does_not_settle_the_scaling():
     """Fifty zeros say nothing of the outputs' size; nor do samples from one corner of the range."""
     inputs, outputs = (Range("x", -1.0, 1.0, "m"),), (Quantity("y", "N"),)

@@ -60,7 +60,7 @@ def _place(number):
     return number, os.getpid()
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_same_seed_finds_the_same_bits_with_one_process_and_with_two_under_load():
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
@@ -77,7 +77,7 @@ def test_the_same_seed_finds_the_same_bits_with_one_process_and_with_two_under_l
     assert other.error != one.error
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_process_that_is_killed_is_told():
     with pytest.raises(PalpateError, match="ended before it had answered"):
         Pool(2).map(_end, range(2))
@@ -90,7 +90,7 @@ def _end(number):
     time.sleep(0.5)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_errors_of_the_work_come_back():
     with pytest.raises(UsageError, match="no such number"):
         Pool(2).map(_refuse, range(2))
@@ -100,7 +100,7 @@ def _refuse(number):
     raise UsageError(f"There is no such number as {number}.")
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("stdin", [False, True])
 def test_a_script_needs_no_guard(stdin):
     text = "from palpate.learning.pool import Pool\nprint(Pool(2).map(abs, [-1, -2, 3]))\n"
@@ -109,7 +109,7 @@ def test_a_script_needs_no_guard(stdin):
     assert said == "[1, 2, 3]\n"
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_processes_end_with_the_one_that_started_them():
     text = (
         "import time; from palpate.learning.pool import Pool\n"

@@ -68,6 +68,7 @@ def test_growth_stops_at_the_limit():
     assert found.loo == min(t.error for t in trials)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("N", [6, 12, 20])
 @pytest.mark.parametrize("n", [1, 2])
 def test_noise_is_never_learnt(N, n):

@@ -225,7 +225,7 @@ def test_every_example_is_checked():
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n in QUICK else pytest.mark.slow) for n in sorted(CHECKS)]
+    "name", [pytest.param(n, marks=[] if n in QUICK else pytest.mark.full) for n in sorted(CHECKS)]
 )
 def test_example(name: str, tmp_path: Path):
     printed = run_file(EXAMPLES / name, tmp_path, 200, PYTHONWARNINGS="")

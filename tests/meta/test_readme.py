@@ -35,7 +35,7 @@ def program(text: str) -> str:
     return re.search(r"```python\n(.*?)```", text, re.DOTALL)[1]
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.timeout(240)
 def test_the_program_runs_as_a_file_without_a_guard(tmp_path: Path):
     text = program(README)
@@ -54,7 +54,7 @@ def titled(title: str) -> str:
     return re.search(rf"^## {title}\n.*?```python\n(.*?)```", README, re.DOTALL | re.MULTILINE)[1]
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.timeout(620)
 def test_the_program_for_soft_bodies_runs(tmp_path: Path):
     text = titled("Soft bodies")
@@ -67,6 +67,7 @@ def test_the_program_for_soft_bodies_runs(tmp_path: Path):
     assert {path.name for path in tmp_path.iterdir()} >= {"pressed.png", "pressed.vtu", "block.zarr"}
 
 
+@pytest.mark.full
 def test_the_program_for_arrays_runs(tmp_path: Path):
     printed = run_program(titled("From your own arrays"), tmp_path, 100)
     assert printed.startswith("Fitted: 2 inputs → 2 outputs")

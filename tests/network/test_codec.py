@@ -126,6 +126,7 @@ def test_a_network_alone_is_a_value_too(tmp_path):
     assert str(Network.load(path)) == str(load_value(path, Network, kind="networks", noun="a network"))
 
 
+@pytest.mark.full
 @given(limit=st.floats())
 def test_any_float_survives_json(limit):
     archive = encode(Linear(SURFACE, abs(limit)), kind="spring")

@@ -94,6 +94,7 @@ def numbered(serial: int, rng: np.random.Generator):
     return replace(network, tail=tail)
 
 
+@pytest.mark.full
 def test_a_reader_in_another_process_sees_only_whole_networks():
     rng = np.random.default_rng(0)
     kinds = [numbered(0, rng) for _ in range(50)]

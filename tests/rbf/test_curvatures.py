@@ -37,6 +37,7 @@ def test_third_derivative_of_the_radial_function_equals_complex_step(name):
     np.testing.assert_allclose(third(name, q), by_step, rtol=1e-12)
 
 
+@pytest.mark.full
 @every_kind
 def test_curvatures_are_the_derivatives_of_the_slopes(kind, name):
     r, X, theta = some_units(kind, name)

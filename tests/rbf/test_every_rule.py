@@ -112,7 +112,7 @@ def test_a_new_unit_meets_its_observation(rule):
     np.testing.assert_allclose(value(after, x, settings), y, rtol=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("update", COVARIANT)
 def test_covariance_stays_symmetric_positive_definite(update):
     """20,000 random steps at P₀ = 100 and R = 1e-4, with growth and pruning, no guard; 5,000 for parts of P."""
@@ -132,6 +132,7 @@ def test_covariance_stays_symmetric_positive_definite(update):
     assert pruned >= 10
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", FORMS)
 @pytest.mark.parametrize("update", COVARIANT)
 def test_covariance_stays_positive_definite_for_every_form(name, update):

@@ -193,6 +193,7 @@ class Sensed:
         self.felt = self.loop.bounds.felt
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("pace", list(PACES))
 @pytest.mark.parametrize("sensor", list(SENSORS))
 @pytest.mark.parametrize("motion", ["still", "moving"])

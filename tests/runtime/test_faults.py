@@ -58,6 +58,7 @@ def until(condition, seconds=20.0):
         time.sleep(0.001)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="a kill that nothing survives is POSIX")
 def test_a_killed_process_leaves_no_force_and_is_healed_by_a_restart(tmp_path):
     """What drops the force is the device's own watchdog; here it is that of a double."""

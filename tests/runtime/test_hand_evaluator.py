@@ -116,6 +116,7 @@ def test_a_rod_that_yields_lies_where_nothing_pulls_and_is_taken_hold_of_there()
     np.testing.assert_allclose(answer.force, -ROD_SPRING * 0.002 * down, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.full
 def test_a_pad_in_the_real_process(tmp_path):
     path = pad().save(tmp_path / "pad.palpate")
     model, d = load_touchable(path), np.array([0.003, -0.004, 0.002])

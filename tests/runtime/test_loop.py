@@ -472,6 +472,7 @@ def test_parameters_start_in_the_middle_and_follow_the_page(handle, shared):
     assert model.answer.seen.tolist() == [3.5, 1.0]
 
 
+@pytest.mark.full
 def test_orphans_stop_and_let_go(plain, handle, shared):
     gone = []
     loop = Loop(plain, handle, shared, WORKSPACE, LIMITS, rate=2000.0, orphaned=lambda: bool(gone))
@@ -484,6 +485,7 @@ def test_orphans_stop_and_let_go(plain, handle, shared):
     assert handle.closed == 1
 
 
+@pytest.mark.full
 def test_an_unforeseen_error_still_lets_go(plain, handle, shared):
     plain.answer.error = SystemExit()  # as a signal that ends the process raises it, wherever it strikes
     loop = Loop(plain, handle, shared, WORKSPACE, LIMITS)

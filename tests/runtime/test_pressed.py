@@ -212,6 +212,7 @@ def test_a_body_that_nothing_touches_is_refused():
         touchable(beside).trained_inputs  # noqa: B018 a property that may fail
 
 
+@pytest.mark.full
 def test_a_stroke_in_the_real_process_feels_the_closed_form(files):
     with LoopProcess(files["alone"], device="stroke:frequency=2,amplitude=0.01") as loop:
         states = watch(loop, 1.0)
@@ -230,6 +231,7 @@ def test_a_stroke_in_the_real_process_feels_the_closed_form(files):
     assert report.work_p50 < 150e-6
 
 
+@pytest.mark.full
 def test_the_flag_tells_inside_from_outside(files):
     with LoopProcess(files["alone"]) as loop:
         shared, home = loop.shared, slab.RADIUS
@@ -246,6 +248,7 @@ def test_the_flag_tells_inside_from_outside(files):
         assert state.depth < 0
 
 
+@pytest.mark.full
 def test_memory_runs_in_the_real_process(files):
     with LoopProcess(files["relaxing"]) as loop:
         model = load_touchable(files["relaxing"])

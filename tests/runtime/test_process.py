@@ -78,6 +78,7 @@ def test_a_stroke_is_felt_and_everything_is_tidied_away(spring_file):
     assert "ticks at" in str(report)
 
 
+@pytest.mark.full
 def test_work_of_a_tick_is_a_small_part_of_it(spring_file):
     """Some 25 µs of CPU time on a free machine; the bound leaves room for a busy one."""
     with LoopProcess(spring_file) as loop:
@@ -89,6 +90,7 @@ def test_work_of_a_tick_is_a_small_part_of_it(spring_file):
     assert loop.report().rate == pytest.approx(1000.0, rel=0.2)
 
 
+@pytest.mark.full
 def test_a_silent_page_gets_zero_force_in_time(spring_file):
     with LoopProcess(spring_file) as loop:
         loop.shared.write_command(beat=now(), period=0.03, grabbed=True, target=(0.0, -0.03, 0.0))
@@ -114,6 +116,7 @@ def test_a_silent_page_gets_zero_force_in_time(spring_file):
         assert again[-1].fault_counts[Fault.INPUT_STALLED] == 1
 
 
+@pytest.mark.full
 def test_stalled_hardware_gets_zero_force_within_20_ms(spring_file):
     with LoopProcess(spring_file, device="stroke:frequency=0.5,stall_at=0.5") as loop:
         states = watch(loop, 1.0)
@@ -127,6 +130,7 @@ def test_stalled_hardware_gets_zero_force_within_20_ms(spring_file):
     assert all(s.fault == Fault.INPUT_STALLED and not s.force.any() for s in after)
 
 
+@pytest.mark.full
 def test_a_lost_number_is_survived_and_ramps_in(spring_file):
     with LoopProcess(spring_file, device="stroke:frequency=0.5,nan_at=0.5,lasting=0.1") as loop:
         states = watch(loop, 1.2)
@@ -141,6 +145,7 @@ def test_a_lost_number_is_survived_and_ramps_in(spring_file):
         assert abs(state.force[1]) <= min(1.0, share) * STIFFNESS * abs(state.position[1]) + 1e-9
 
 
+@pytest.mark.full
 def test_a_hardware_like_failure_is_recorded(spring_file):
     with LoopProcess(spring_file, device="stroke:fail_at=0.2,lasting=0.1") as loop:
         wait_for(lambda: loop.read().tick > 500)
@@ -163,6 +168,7 @@ def test_a_python_that_cannot_run_is_explained(spring_file, monkeypatch):
     assert not Path(loop.shared.name).exists()
 
 
+@pytest.mark.full
 @POSIX
 def test_the_opened_devices_own_limits_count_and_a_killed_loop_is_noticed(spring_file):
     with LoopProcess(spring_file, device="simulated:profile=falcon", max_force=100.0) as loop:
@@ -179,6 +185,7 @@ def test_the_opened_devices_own_limits_count_and_a_killed_loop_is_noticed(spring
     assert loop.report().ticks > 0
 
 
+@pytest.mark.full
 @POSIX
 def test_ctrl_c_is_the_parents_business_and_terminate_is_clean(spring_file):
     with LoopProcess(spring_file, device="stroke") as loop:
@@ -199,6 +206,7 @@ time.sleep(600)
 """
 
 
+@pytest.mark.full
 @POSIX
 def test_a_dead_parent_takes_the_loop_and_its_memory_along(spring_file):
     parent = subprocess.Popen(
@@ -213,6 +221,7 @@ def test_a_dead_parent_takes_the_loop_and_its_memory_along(spring_file):
     assert not Path(block).exists()
 
 
+@pytest.mark.full
 def test_bad_beginnings_are_explained(spring_file, tmp_path):
     broken = tmp_path / "broken.palpate"
     broken.write_bytes(b"not a model")
@@ -230,6 +239,7 @@ def test_bad_beginnings_are_explained(spring_file, tmp_path):
         LoopProcess(spring_file).read()
 
 
+@pytest.mark.full
 def test_a_start_that_fails_leaves_no_shared_memory(spring_file, monkeypatch):
     names, most, create = [], [1], shared_memory.create
 
@@ -258,6 +268,7 @@ def test_no_rate_makes_a_ring_that_fills_the_memory():
         assert Ring.private(rate).length <= 40_100
 
 
+@pytest.mark.full
 def test_parameters_reach_the_loop(spring_file):
     with LoopProcess(spring_file, parameters=[1.5]) as loop:
         assert loop.shared.command.record["parameters"][0] == 1.5

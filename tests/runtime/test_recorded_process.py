@@ -64,6 +64,7 @@ def test_a_run_is_recorded_from_its_first_tick_and_a_button_records_its_midst(sp
         pass
 
 
+@pytest.mark.full
 def test_a_replay_is_published_at_its_own_pace(spring_file, tmp_path):
     path = tmp_path / "a.trace"
     with LoopProcess(spring_file, device="stroke:frequency=2", record=path) as loop:
@@ -83,6 +84,7 @@ def test_a_replay_is_published_at_its_own_pace(spring_file, tmp_path):
     assert all(abs(b.time - a.time) < 1.0 for a, b in itertools.pairwise(states))
 
 
+@pytest.mark.full
 @pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
 def test_a_killed_recorder_loses_less_than_a_second(spring_file, tmp_path):
     path = tmp_path / "a.trace"
@@ -129,6 +131,7 @@ def test_an_unfinished_chunk_is_left_out_with_a_note(tmp_path):
         read_trace(path)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(os.name != "posix", reason="limits of a process are POSIX's")
 def test_a_full_disk_ends_the_recording_and_not_the_loop(spring_file, tmp_path):
     resource = pytest.importorskip("resource")

@@ -79,6 +79,7 @@ def assert_same(trace, body):
     assert np.abs(trace.ticks["force"]).max() > 1e-3, "something was felt"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("before", [0, 400])
 @pytest.mark.parametrize("name", list(BODIES))
 def test_a_simulated_hand_is_replayed_to_the_last_bit(name, before, tmp_path):

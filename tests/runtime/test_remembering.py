@@ -138,6 +138,7 @@ def test_a_body_and_its_file_are_told_from_others(tmp_path):
     assert again.stiffness_max == pytest.approx(stiffest, rel=1e-9)
 
 
+@pytest.mark.full
 def test_in_the_real_process_it_stays_bent(tmp_path):
     path = body().save(tmp_path / "rod.palpate")
     with LoopProcess(path, max_force=1e3) as loop:

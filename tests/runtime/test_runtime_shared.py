@@ -28,6 +28,7 @@ while now() < until and not (shared.command.fetch() and shared.command.record["q
 """
 
 
+@pytest.mark.full
 def test_reader_never_sees_a_torn_record(shared):
     writer = subprocess.Popen([sys.executable, "-c", WRITER, shared.name])
     record, seen, until = shared.state.record, set(), now() + 60.0

@@ -165,6 +165,7 @@ BODIES = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("pace", [(1000.0, 0.0), (200.0, 0.005)], ids=["1 kHz", "200 Hz, 5 ms"])
 @pytest.mark.parametrize("name", list(BODIES))
 def test_no_more_energy_than_sampling_leaks_and_blending_adds(name, pace):
@@ -366,6 +367,7 @@ def test_a_surrogate_too_large_for_the_runtime_is_refused_by_what_is_too_large(m
     assert raised.value.fix
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("before", [0, 300])
 @pytest.mark.parametrize("name", list(BODIES))
 def test_swaps_are_replayed_to_the_last_bit(name, before, tmp_path):

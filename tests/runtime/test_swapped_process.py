@@ -59,6 +59,7 @@ def test_surrogates_take_over_while_the_loop_ticks_and_are_replayed(files, tmp_p
     assert Replay(trace, load_touchable(files[0.8])).run().identical
 
 
+@pytest.mark.full
 def test_what_can_not_take_over_leaves_the_old_body_in_the_hand(files, tmp_path):
     pad = held.pad().save(tmp_path / "pad.palpate")
     damaged = tmp_path / "damaged.palpate"
@@ -79,6 +80,7 @@ def test_what_can_not_take_over_leaves_the_old_body_in_the_hand(files, tmp_path)
     assert loop.report().obtained, "what it said besides is not lost"
 
 
+@pytest.mark.full
 def test_several_at_once_wait_for_each_other(files):
     begun = []
     with LoopProcess(files[1.0]) as loop:
@@ -93,6 +95,7 @@ def test_several_at_once_wait_for_each_other(files):
     assert len(set(begun)) == 3
 
 
+@pytest.mark.full
 def test_a_replay_takes_no_other_surrogate(files, tmp_path):
     path = tmp_path / "a.trace"
     with LoopProcess(files[1.0], device="simulated:frequency=3", record=path) as loop:

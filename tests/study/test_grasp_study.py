@@ -13,7 +13,7 @@ from palpate.cli import main
 from palpate.study import preset_study, to_toml
 from palpate.study.run import Paths, carry_out, report_study
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.full, pytest.mark.timeout(600)]
 
 
 @pytest.fixture(scope="module")

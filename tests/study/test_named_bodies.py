@@ -11,7 +11,7 @@ from palpate.study import Study, preset_study
 from palpate.study.run import Paths, carry_out
 from palpate.surrogates import Surrogate
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.full, pytest.mark.timeout(600)]
 
 
 def small(name: str) -> Study:

@@ -288,7 +288,7 @@ force_p95 = 0.3
 """
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.timeout(300)
 def test_a_part_goes_the_whole_way(folder, tmp_path):
     """Solves, learning, validation and report work on a part as on any body, and are not repeated."""

@@ -28,6 +28,7 @@ CONTENT = {
 }
 
 
+@pytest.mark.full
 def test_a_held_press_goes_from_the_instantaneous_to_the_relaxed_body():
     """At once the force is the base law's; after long it is that of the law whose distortion has relaxed."""
     block = pp.shapes.Block((0.04, 0.04, 0.02), element=0.02)
@@ -56,7 +57,7 @@ def test_times_are_those_of_the_materials():
     assert prony_times(Study.model_validate(elastic)) == ()
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_surrogate_of_a_study_relaxes():
     study = Study.model_validate(CONTENT)
     train, _ = sweep_study(study, progress=False)

@@ -73,6 +73,7 @@ def solved():
     return s, grid, two, sobol
 
 
+@pytest.mark.full
 def test_a_grid_is_split_row_by_row_and_keeps_its_ends_for_training(solved):
     s, grid, _, _ = solved
     train, test = split_rows(s, grid, None)
@@ -116,6 +117,7 @@ def test_datasets_of_different_bodies_are_not_put_together(solved):
     assert both.rest.shape == grid.rest.shape
 
 
+@pytest.mark.full
 def test_networks_may_do_without_units(solved):
     _, grid, _, _ = solved
     touch = learn_bent(grid, effort=0.1, refinement=Refinement(units_max=0)).surrogate
@@ -135,6 +137,7 @@ def test_a_coupling_that_holds_nothing_is_refused(solved):
         learn_bent(sobol, passes=1, refinement=Refinement(samples=0, units_max=1, starts=1), coupling=0.0)
 
 
+@pytest.mark.full
 def test_two_loads_get_a_coupling_and_the_answer_leads_back_to_the_hand(solved):
     _, _, _, sobol = solved
     few = Refinement(samples=0, units_max=8, target=1e-3, starts=1)
@@ -152,6 +155,7 @@ def test_two_loads_get_a_coupling_and_the_answer_leads_back_to_the_hand(solved):
     np.testing.assert_allclose(contact + compliance * loads @ directions, hand @ directions, atol=0.05)
 
 
+@pytest.mark.full
 def test_random_loads_leave_no_dead_zone_at_the_first_touch(solved):
     """No solve is near rest, but without load nothing deflects: a hundredth of the loads moves the beam."""
     _, _, two, sobol = solved

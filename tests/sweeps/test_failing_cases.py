@@ -107,6 +107,7 @@ def test_the_limit_of_a_case_is_a_time():
         sweep(Spring(), points=[1.0], case_limit=0.0)
 
 
+@pytest.mark.full
 def test_a_killed_worker_changes_no_bit_and_leaves_nothing(cluster):
     ground = Ground(seconds=0.005)
     with local_cluster(1) as mortal:
@@ -156,6 +157,7 @@ def test_no_scheduler_is_said_in_a_sentence():
     assert caught.value.exit_code == 3
 
 
+@pytest.mark.full
 @pytest.mark.filterwarnings(
     "ignore::pytest.PytestUnraisableExceptionWarning"
 )  # sockets that Dask lets go, below

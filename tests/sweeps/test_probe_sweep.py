@@ -22,7 +22,7 @@ def data(cluster):
     return sweep(PROBLEM, samples=SAMPLES, seed=0, cluster=cluster)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_probe_is_swept_in_columns(data):
     assert data.provenance["design"] == "columns"
     assert data.converged.all()
@@ -36,7 +36,7 @@ def test_a_probe_is_swept_in_columns(data):
     np.testing.assert_allclose(data.potential_energy[row], alone.potential_energy, rtol=1e-8)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_slopes_of_the_energy_are_in_the_rows(data):
     """Within a column ΔU = ∫ F dz, by the trapezoidal rule corrected with the slopes ∂F/∂c at its ends.
 
@@ -50,7 +50,7 @@ def test_the_slopes_of_the_energy_are_in_the_rows(data):
         assert data.potential_energy[b] - data.potential_energy[a] == pytest.approx(work, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_one_worker_or_two_and_an_interruption_change_no_bit(data, cluster, tmp_path):
     def interrupt(done, total):
         if done >= SAMPLES // 2:

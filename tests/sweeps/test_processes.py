@@ -15,7 +15,7 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.sweeps import local_cluster
 
-pytestmark = pytest.mark.slow  # programs and their worker processes
+pytestmark = pytest.mark.full  # programs and their worker processes
 
 SCRIPT = """
 from palpate.physics import Cantilever, Circle, LinearElastic, TipLoad

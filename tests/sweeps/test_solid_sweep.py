@@ -61,6 +61,7 @@ def test_another_design_may_be_asked_for(cluster):
         sweep(SPRING, samples=8, design="columns", cluster=cluster)
 
 
+@pytest.mark.full
 def test_chains_begin_anew_whoever_solves_them(cluster, tmp_path):
     """The energy counts the solves since opening or reset: each column counts from 1, however it was run."""
     two = sweep(Ground(log=str(tmp_path)), samples=64, cluster=cluster)
@@ -73,6 +74,7 @@ def test_chains_begin_anew_whoever_solves_them(cluster, tmp_path):
     np.testing.assert_allclose(surplus, np.tile([1e-13, 2e-13, 3e-13, 4e-13], 16), atol=2e-14)
 
 
+@pytest.mark.full
 def test_an_interruption_changes_no_bit(cluster, tmp_path):
     arguments = {"samples": 64, "cluster": cluster, "path": tmp_path / "a.zarr"}
     for count in (9, 30):
@@ -120,6 +122,7 @@ def test_parts_of_another_mesh_are_not_taken_up(cluster, tmp_path):
     assert data.hash == whole.hash
 
 
+@pytest.mark.full
 def test_a_worker_that_dies_by_accident_changes_no_bit(tmp_path):
     deadly = Ground().design(16, 0)[5, 0]
     with local_cluster(2) as mortal:
@@ -213,7 +216,7 @@ def test_a_schema_has_to_fit_the_layout():
         sweep(odd, samples=4)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_guides_own_solver_runs(tmp_path):
     guide = Path(__file__).parents[2] / "docs" / "guide" / "datasets-and-files.md"
     (program,) = re.findall(r"```python\n(.*?)```", guide.read_text(encoding="utf-8"), re.DOTALL)

@@ -51,6 +51,7 @@ def test_the_number_of_workers_changes_no_bit(cluster):
     assert one.hash == two.hash
 
 
+@pytest.mark.full
 def test_workers_on_demand_serve_all_sweeps_and_start_for_none_that_is_solved(tmp_path):
     with OnDemandCluster(1) as workers:
         data = sweep(Spring(), points=[1.0, 2.0], path=tmp_path / "a.zarr", cluster=workers)
@@ -234,6 +235,7 @@ def test_a_damaged_dataset_at_the_path_says_to_delete_it(cluster, tmp_path):
     assert "sweep again" in caught.value.fix
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("when", [0, 1])
 def test_two_runs_of_one_sweep_end_alike(cluster, tmp_path, when):
     """A second run starts and ends while the first one is at it: as it begins, or just before its end."""

@@ -40,6 +40,7 @@ def trace(problem):
     return Trace(Path("press.trace"), {"name": "spring", "inputs": inputs, "parameters": []}, ticks)
 
 
+@pytest.mark.full
 def test_a_stroke_is_solved_from_each_equilibrium_to_the_next(problem, trace):
     comparison = compare_full_model(trace, problem, most=4)
     assert 3 <= len(comparison.time) <= 4

@@ -128,6 +128,7 @@ def test_the_page_is_one_file(pruned):
         growth_html(GrowthRecorder(), NAME)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "name", ["<!--<script>", "</script><script>alert(1)</script>", "{{data}}", "&lt;\u2028"]
 )

@@ -17,7 +17,7 @@ GUIDE = (Path(__file__).parents[2] / "docs" / "guide" / "python.md").read_text(e
 BLOCKS = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.timeout(240)
 def test_the_program_that_writes_a_report_runs(tmp_path: Path) -> None:
     (program,) = (block for block in BLOCKS if "write_report(" in block)

@@ -173,6 +173,7 @@ def test_tables_hold_what_was_given(read: Reader) -> None:
         assert words.replace("\N{NO-BREAK SPACE}", " ") in read.text.replace("\N{NO-BREAK SPACE}", " ")
 
 
+@pytest.mark.full
 def test_the_same_data_give_the_same_page(tmp_path: Path) -> None:
     pages = [write_report(tmp_path / f"{i}.html", [chapter()]).read_bytes() for i in (1, 2)]
     assert pages[0] == pages[1]
@@ -244,6 +245,7 @@ def test_a_browser_shows_it_without_complaint(
     page.close()
 
 
+@pytest.mark.full
 def test_text_stands_out_from_its_ground(browser: Browser, report: Path) -> None:
     """Contrast of at least 4.5 to 1 for all running text, in both schemes (WCAG 2.2, 1.4.3)."""
     for scheme in ("light", "dark"):

@@ -96,6 +96,7 @@ def test_a_large_strain_is_warned_of() -> None:
     assert strains[0.08].startswith("The largest fibre strain is 8 %. Warning: that is above 5 %")
 
 
+@pytest.mark.full
 def test_networks_are_told_apart_by_name_and_units() -> None:
     touch = with_units(tip_model(), nodes=2, displacement=3, energy=5, filter=4)
     assert [(name, units) for name, _, units in network_rows(touch)] == [

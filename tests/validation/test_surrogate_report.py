@@ -40,6 +40,7 @@ def test_curves_lie_on_the_closed_form_with_the_solves_of_their_column() -> None
         assert (np.diff(RADIUS - test.X[curve.rows, 2]) < 0).all()
 
 
+@pytest.mark.full
 def test_depths_of_one_place_are_told_from_places() -> None:
     test = columns()
     assert "The 20 solves lie over 4 places, at several depths of each." in str(validate(surrogate(), test))
@@ -56,7 +57,7 @@ def test_a_flat_face_is_seen_from_above() -> None:
     np.testing.assert_allclose(there, np.column_stack([X[:, :2], np.full(50, RADIUS - 0.004)]), atol=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_of_a_family_it_is_told_which_body_is_shown(tmp_path: Path) -> None:
     inputs = (*INPUTS, Range("young", 5e3, 15e3, "Pa"))
     network = linear_network(list(inputs), [Quantity("ln U/U0")], np.array([[np.log(A), B * 0.02, 0, 0, 0]]))
@@ -76,7 +77,7 @@ def test_of_a_family_it_is_told_which_body_is_shown(tmp_path: Path) -> None:
     assert "The surrogate states no deviation. Shown for young = 6000 Pa." in text
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("images", [1, 8])
 def test_a_picture_of_a_part_says_that_it_is_one(tmp_path: Path, images: int) -> None:
     S, test = surrogate(meta={"solves": 12, "samples": 12 * images}), solves()
@@ -87,7 +88,7 @@ def test_a_picture_of_a_part_says_that_it_is_one(tmp_path: Path, images: int) ->
     assert f"{v.smoothness.p95:.2f} times as much as its reference (the model" in " ".join(text.split())
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_both_kinds_of_bodies_stand_in_one_report(tmp_path: Path) -> None:
     S, test = surrogate(root=steady(0.01), meta={"name": HOSTILE, "solves": 12}), solves()
     touched = Chapter(HOSTILE, S, test, validate(S, test), settings={HOSTILE: 1.0})

@@ -60,6 +60,7 @@ def test_the_exact_surrogate_has_no_error() -> None:
     v.raise_if_failed()
 
 
+@pytest.mark.full
 def test_too_few_solves_are_cautioned_of_wherever_they_are_read() -> None:
     few, enough = (validate(surrogate(), solves(places(n))) for n in (5, 20))
     assert "5 unseen solves can't judge much" in few.caution
@@ -149,6 +150,7 @@ def test_solves_along_a_stroke_are_the_reference_where_they_are_given() -> None:
         validate(deep, solves(), strokes=[stroke.take(np.arange(5))])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("stated", "held"), [(0.01, 0.9), (0.004, 0.489), (0.03, 1.0)])
 def test_an_interval_holds_what_the_errors_say(stated: float, held: float) -> None:
     """Errors of 1 % standard deviation lie within 1.645 σ with P(|N| < 1.645 σ/1 %), to 4 binomial deviations."""
@@ -165,6 +167,7 @@ def test_an_interval_holds_what_the_errors_say(stated: float, held: float) -> No
     assert missed(v) == (set() if stated == 0.01 else {"interval_coverage"})
 
 
+@pytest.mark.full
 def test_a_band_is_missed_on_either_side() -> None:
     check = next(
         c
@@ -209,6 +212,7 @@ def test_thirds_and_the_edge_are_told_apart() -> None:
     )
 
 
+@pytest.mark.full
 def test_the_worst_cases_are_named_with_their_inputs_and_forces() -> None:
     test = solves()
     heavy = np.flatnonzero(np.linalg.norm(test.force, axis=1) > 0.5)
@@ -224,6 +228,7 @@ def test_the_worst_cases_are_named_with_their_inputs_and_forces() -> None:
     assert "worst 1: 5 %" in str(v)
 
 
+@pytest.mark.full
 def test_the_mesh_s_own_error_stands_apart() -> None:
     """The refined body is 5 % stiffer: an exact surrogate of the coarse one is then off by 1 − 1/1.05."""
     fine = TouchSolves(places()[:50], 1.05 * force(places()[:50]))

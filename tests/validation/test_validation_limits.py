@@ -197,6 +197,7 @@ def test_a_dataset_of_another_body_is_refused(model: Surrogate, data: Dataset, w
     assert caught.value.fix
 
 
+@pytest.mark.full
 def test_validating_loads_neither_matplotlib_nor_jinja() -> None:
     code = (
         "import sys, palpate.validation as v; v.Limits(); early = 'numpy' in sys.modules; v.validate; "

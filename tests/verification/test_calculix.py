@@ -43,6 +43,7 @@ def assert_same(solution, answer, moved, fixed, within=PRINTED):
     assert not answer.displacement[fixed].any()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("law", "write", "push", "strain"),
     [

@@ -43,7 +43,7 @@ def ripple(values, degree):
     return float(np.sqrt(rest @ rest / (len(x) - degree - 1)))
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_sliding_sphere_hardly_feels_the_mesh(usual):
     normal = usual[:, 2].mean()
     assert normal > 0
@@ -51,7 +51,7 @@ def test_a_sliding_sphere_hardly_feels_the_mesh(usual):
     assert ripple(usual[:, 0], 3) < 0.002 * normal
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_imprint_and_force_converge_with_the_elements(usual):
     """Displacements of second order: the force's error falls at least with the square of the element size."""
     coarse = slid(PLACES, 0.009)
@@ -63,7 +63,7 @@ def test_imprint_and_force_converge_with_the_elements(usual):
     assert errors[1] < 0.02 * fine
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_sphere_that_is_swallowed_is_never_an_answer():
     """A pad of 2e6 N/m³ without a stop lets the block close over the sphere at some depth of less than its diameter."""
     probe = SphereProbe(RADIUS, pad=2e6, stop=None, over=((0.049, 0.049), (0.051, 0.051)))
@@ -80,7 +80,7 @@ def test_a_sphere_that_is_swallowed_is_never_an_answer():
         assert np.linalg.norm(one.mesh.points + one.displacement - one.inputs, axis=1).min() > RADIUS / 2
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_with_a_stop_the_same_depth_has_an_answer():
     probe = SphereProbe(RADIUS, pad=2e6, stop=0.004, over=((0.049, 0.049), (0.051, 0.051)))
     found = (

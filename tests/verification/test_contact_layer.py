@@ -82,14 +82,14 @@ def test_the_integral_equation_agrees_with_a_later_series_closer_to_the_ground()
         assert exact(0.5, chi) == pytest.approx(garcia(chi), rel=3e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_on_a_compressible_layer_the_ground_adds_what_theory_says():
     force = pressed(0.3, 0.2)
     assert force == pytest.approx(dimitriadis(0.3, 0.2), rel=0.02)
     assert force == pytest.approx(exact(0.3, 0.2), rel=0.005)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_on_a_nearly_incompressible_layer_the_ground_adds_what_theory_says():
     problem, _ = quarter(0.4999, 0.2, 3.0)
     assert problem.body.mixed_regions == ("body",)
@@ -98,7 +98,7 @@ def test_on_a_nearly_incompressible_layer_the_ground_adds_what_theory_says():
     assert force == pytest.approx(exact(0.4999, 0.2), rel=0.005)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_on_a_deep_body_hertz_is_right():
     force = pressed(0.3, 0.02, width=2.0)
     assert force == pytest.approx(1, rel=0.025)

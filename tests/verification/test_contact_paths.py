@@ -37,7 +37,7 @@ def sliding():
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param(0.45, id="displacement"), pytest.param(0.4999, id="mixed", marks=pytest.mark.slow)],
+    params=[pytest.param(0.45, id="displacement"), pytest.param(0.4999, id="mixed", marks=pytest.mark.full)],
 )
 def solver(request):
     probe = SphereProbe(RADIUS, pad=PAD, stop=STOP, depth=(0.0, 0.006))
@@ -73,6 +73,7 @@ def work(found):
     return total
 
 
+@pytest.mark.full
 def test_the_work_of_pressing_and_sliding_is_the_change_of_energy(pressed, slid):
     """A smooth force would leave an error of h⁴/720 of the change of its third derivative.
 
@@ -118,6 +119,7 @@ def test_the_force_is_the_pads_pressure_and_the_reaction_of_the_support(solver, 
         np.testing.assert_allclose(found.response, [gradient @ e for e in moves], atol=1e-8 * scale)
 
 
+@pytest.mark.full
 def test_the_state_does_not_depend_on_the_way(solver, slid):
     """By sliding, straight from outside, back from 6 mm, and from the other side."""
     by_sliding = slid[5]

@@ -93,7 +93,7 @@ def test_displacements_alone_lock_and_the_mixed_form_does_not():
     assert raised(GEL, 4, LINE, MIDDLE) > stiff * GEL_RISE  # the mixed form with half the elements is better
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_small_strain_meets_the_published_rise():
     values = [raised(GEL, n, LINE, MIDDLE) for n in (4, 8, 16)]
     assert limit(values) == pytest.approx(GEL_RISE, rel=2e-3)

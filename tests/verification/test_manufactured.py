@@ -119,6 +119,7 @@ def observed(name):
     return np.log2(errors(3, CASES[name]) / errors(6, CASES[name]))
 
 
+@pytest.mark.full
 def test_displacement_and_force_converge_as_theory_says():
     distance, slope, reaction = observed("neo-Hooke")
     assert distance == pytest.approx(K + 1, abs=0.2)
@@ -131,14 +132,14 @@ def test_the_force_is_exact_where_its_adjoint_solution_is_linear():
     assert errors(4, CASES["linear"])[2] < 1e-10
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_small_strain_converges_as_theory_says():
     distance, slope, _ = observed("linear")
     assert distance == pytest.approx(K + 1, abs=0.2)
     assert slope == pytest.approx(K, abs=0.2)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["linear mixed", "neo-Hooke mixed"])
 def test_the_mixed_form_converges_as_theory_says(name):
     """At least: the displacement begins above its asymptote, where what it inherits from the pressure still counts."""

@@ -127,6 +127,7 @@ def test_le1_elliptic_membrane():
         assert at_d(found, height, found.von_mises) == pytest.approx(92.7e6, rel=0.01)
 
 
+@pytest.mark.full
 def test_le10_thick_plate():
     """Within 2 %; the pressure on the face is met to 4 %."""
     stress = at_d(plate(element=0.3, fine=0.03), THICK)
@@ -135,7 +136,7 @@ def test_le10_thick_plate():
     assert abs(stress[0, 0]) < 0.02 * 5.38e6
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_le10_on_a_finer_mesh():
     stress = at_d(plate(element=0.15, fine=0.03), THICK)
     assert stress[1, 1] == pytest.approx(-5.38e6, rel=0.01)

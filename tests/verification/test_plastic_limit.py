@@ -84,6 +84,7 @@ def pressed(poisson, fronts, form, n, hardening=0.0):
     return pressures(material, [bore(material, front) for front in fronts], form, n) / LIMIT
 
 
+@pytest.mark.full
 def test_the_pressure_follows_the_front_up_to_the_limit():
     """Straight elements have chords for circles: the limit comes with the second power of their size."""
     fronts = (0.9, 1.2, 1.6, 2.6)
@@ -98,6 +99,7 @@ def test_the_limit_of_a_compressible_metal_is_the_same():
     assert last[0] == pytest.approx(last[1], rel=1e-4)
 
 
+@pytest.mark.full
 def test_displacements_alone_never_reach_a_limit():
     """Plastic flow keeps the volume, so the displacement form of an incompressible metal hardens without end."""
     fronts = (1.0, 1.6, 2.6, 6.0, 10.0)
@@ -120,6 +122,7 @@ def test_all_of_a_tube_at_its_limit_is_at_yield():
     assert found[0].von_mises.max() < YIELD
 
 
+@pytest.mark.full
 def test_hardening_fades_linearly():
     """What a plastic modulus h adds to the limit is proportional to it."""
     fronts = (1.0, 1.6, 2.6)
@@ -129,7 +132,7 @@ def test_hardening_fades_linearly():
     assert gains[1] / gains[0] == pytest.approx(10, rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_dead_pressure_beyond_the_limit_is_refused():
     problem = tube(metal(0.4999), SurfaceTraction("left", "normal", (-1e9, 0.0)), "mixed", 3)
     assert problem.solve([-0.99 * LIMIT], dt=1.0).converged

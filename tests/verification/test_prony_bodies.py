@@ -105,7 +105,8 @@ def discrete_loss(steps, frequency):
     return SHARE * (1 - decay) / ratio * ((1 - back) / (1 - decay * back)).imag
 
 
-@pytest.mark.parametrize("frequency", [1 / TIME, pytest.param(0.3 / TIME, marks=pytest.mark.slow)])
+@pytest.mark.full
+@pytest.mark.parametrize("frequency", [1 / TIME, pytest.param(0.3 / TIME, marks=pytest.mark.full)])
 def test_a_swaying_block_loses_what_the_loss_modulus_says(frequency):
     """π q₀² k g'' in a cycle, with the elastic stiffness k of the same mesh, but for what the step's length costs."""
     wanted = viscous(LinearElastic(YOUNG, 0.5)).prony.loss(frequency)

@@ -34,7 +34,7 @@ def motion():
     return times, start + along[:, None] * np.array([1.0, 0.0, 0.0])
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_held_and_slid_the_branches_follow_the_transient_solve():
     """The force within 5 % while it slides, three times better than elastic and than a scalar memory."""
     times, places = motion()

@@ -92,7 +92,7 @@ def test_the_closed_forms_agree_at_small_strain():
     assert lame(A, 0.5, pressure) == pytest.approx(1e-6 * A, rel=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("poisson", [0.3, 0.4999])
 def test_a_sphere_of_small_strain_is_that_of_lame(poisson):
     """To 1e-3 with some five elements in the wall, the error falling with the third power of their size or faster."""
@@ -101,7 +101,7 @@ def test_a_sphere_of_small_strain_is_that_of_lame(poisson):
     assert math.log2(coarse / fine) > 3
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_sphere_inflated_by_a_third_is_that_of_the_closed_form():
     coarse, fine = (abs(widened(0.5, halvings) / growth(1.3) - 1) for halvings in (1, 2))
     assert fine < 1e-3

@@ -33,6 +33,7 @@ def still(client: Client, y: float, *, grabbed: bool) -> Frame:
         time.sleep(0.01)
 
 
+@pytest.mark.full
 def test_the_picture_is_that_of_the_place_and_the_force():
     with Viewer(ROD, port=0, max_force=100.0) as viewer, client_of(viewer) as client:
         assert client.hello.line.travel[0][1] == pytest.approx(-REACH)
@@ -59,6 +60,7 @@ def test_the_picture_is_that_of_the_place_and_the_force():
         np.testing.assert_allclose(again.force, 0.0, atol=1e-4)
 
 
+@pytest.mark.full
 def test_the_page_shows_it_bent(visit, keep):
     with Viewer(ROD, port=0, max_force=100.0) as viewer:
         page = visit(viewer)

@@ -16,7 +16,7 @@ from palpate.viewer import BodyViewer
 from palpate.viewer.shown_body import ShownBody, ShownStep
 from palpate.viewer.web_server import way_in
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.full, pytest.mark.timeout(120)]
 
 
 @pytest.fixture(scope="module")

@@ -36,6 +36,7 @@ def stalls(viewer: Viewer) -> int:
     return int(viewer.loop.read().fault_counts[Fault.INPUT_STALLED])
 
 
+@pytest.mark.full
 def test_a_page_too_busy_to_draw_keeps_its_force_and_one_that_hangs_says_why_not(page: Page, viewer: Viewer):
     for _ in range(5):  # on a machine under load the worker may be late as well
         drag(page, -20, 80)
@@ -88,6 +89,7 @@ def test_a_gamepad_pulls_and_rumbles_with_the_force(page: Page, rod: Surrogate, 
     page.evaluate("delete navigator.getGamepads, 0")
 
 
+@pytest.mark.full
 def test_sticks_have_a_dead_zone_without_a_jump(page: Page):
     got = page.evaluate(
         """async () => {
@@ -103,7 +105,7 @@ def test_sticks_have_a_dead_zone_without_a_jump(page: Page):
     np.testing.assert_allclose(np.array(got, float), wanted, atol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.timeout(180)
 def test_a_device_drives_and_the_page_stops_it(browser: Browser, keep):
     complaints: list[str] = []

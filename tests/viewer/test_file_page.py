@@ -234,6 +234,7 @@ def test_an_indentation_stays_on_the_page(opened_yielding: tuple[Page, list[str]
     assert_no(complaints)
 
 
+@pytest.mark.full
 def test_fields_for_which_there_is_no_room_are_left_out_and_named(
     yielding: Surrogate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

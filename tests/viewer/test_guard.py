@@ -148,6 +148,7 @@ def test_each_start_has_a_secret_of_its_own():
     )
 
 
+@pytest.mark.full
 def test_a_page_without_a_token_is_an_explicit_wish_and_warned_of(rod, monkeypatch, capsys):
     def look(viewer: Viewer) -> None:
         assert viewer.url == viewer.address
@@ -159,6 +160,7 @@ def test_a_page_without_a_token_is_an_explicit_wish_and_warned_of(rod, monkeypat
     assert "Warning: this page asks for no token" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_the_browsers_command_line_holds_no_token(rod, monkeypatch, capsys):
     opened: list[str] = []
     monkeypatch.setattr(webbrowser, "open", opened.append)

@@ -176,6 +176,7 @@ def test_all_points_of_the_top_may_keep_a_print_and_no_others(file, dents, tmp_p
     assert len(PageModel(load_touchable(travelling)).surface.yielding) == 0
 
 
+@pytest.mark.full
 def test_print_and_elastic_shape_together_touch_the_ball(file):
     body = load_touchable(file)
     model, elastic = PageModel(body), PageModel(touchable(touched_slab()))
@@ -220,7 +221,7 @@ def test_more_places_than_the_shared_memory_carries_are_refused(dents):
         Loop(body, object(), Shared.private(), body.workspace(0.06), Limits(8.0))
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_prints_run_in_the_real_process(file):
     with LoopProcess(file) as loop:
         space = load_touchable(file).workspace(loop.read().radius)

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser
 from held import PAD_SPRING, pad, pad_force
 from palpate.viewer import Viewer
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.full, pytest.mark.timeout(120)]
 
 
 def test_a_pad_is_pulled_with_the_force_of_its_energy(browser: Browser, keep):

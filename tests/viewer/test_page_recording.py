@@ -66,6 +66,7 @@ def test_a_page_records_a_touch_from_its_midst(recording_viewer, rod, tmp_path):
     np.testing.assert_allclose(apart, 0.0, atol=1e-5)  # pages get 32 bits
 
 
+@pytest.mark.full
 def test_a_folder_that_is_gone_is_told_to_the_page(recording_viewer, tmp_path):
     tmp_path.rmdir()
     with client_of(recording_viewer) as client:
@@ -76,6 +77,7 @@ def test_a_folder_that_is_gone_is_told_to_the_page(recording_viewer, tmp_path):
     tmp_path.mkdir()
 
 
+@pytest.mark.full
 def test_the_button_says_what_is_written(recording_viewer, visit: Callable[..., Page], tmp_path):
     page = visit(recording_viewer)
     page.click("#record")

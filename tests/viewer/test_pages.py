@@ -20,7 +20,7 @@ from palpate.units import Quantity, Range
 from palpate.viewer import Viewer, hand_lock
 from websocket_page import client_of
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.full, pytest.mark.timeout(120)]
 
 
 def test_a_finger_pulls(visit, keep, viewer: Viewer, rod: Surrogate):

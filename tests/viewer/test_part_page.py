@@ -22,7 +22,7 @@ from palpate.units import parse_quantity
 from palpate.viewer.part_page import PartPage, Progress, serve_part
 from palpate.viewer.shown_part import PartChoices, ShownPart
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.full, pytest.mark.timeout(180)]
 
 LENGTH, WIDTH, HEIGHT = 40.0, 30.0, 20.0  # mm, of a box with 12 triangles
 

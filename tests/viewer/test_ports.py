@@ -44,6 +44,7 @@ def test_no_such_port(port: int):
         listen(port)
 
 
+@pytest.mark.full
 def test_a_viewer_on_a_busy_port(rod: Surrogate, taken: int):
     with Viewer(rod, port=taken) as moved:
         assert moved.port != taken

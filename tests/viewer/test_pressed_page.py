@@ -16,7 +16,7 @@ from palpate.surrogates import Surrogate
 from palpate.viewer import Viewer
 from palpate.viewer.surface_drawing import SurfaceDrawing
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.full, pytest.mark.timeout(180)]
 
 
 @pytest.fixture(scope="module")

@@ -49,7 +49,7 @@ def script(rod: Surrogate, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
         process.kill()
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.skipif(os.name != "posix", reason="signals of a terminal are POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_serve_ends_in_good_order(script: subprocess.Popen[str], number: signal.Signals):
@@ -68,6 +68,7 @@ def test_serve_ends_in_good_order(script: subprocess.Popen[str], number: signal.
         httpx.get(url)
 
 
+@pytest.mark.full
 def test_stopping_twice_and_a_model_in_memory(rod: Surrogate):
     viewer = Viewer(rod, port=0).start()
     assert httpx.get(viewer.url).headers["content-type"].startswith("text/html")
@@ -90,7 +91,7 @@ def test_an_unknown_device_is_a_usage_error(rod: Surrogate):
         Viewer(rod, port=0, device="gloves").start()
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_after_a_failed_start_nothing_is_left(rod: Surrogate):
     with Viewer(rod, port=0) as first:
         second = Viewer(rod, port=first.port, strict_port=True)

@@ -205,6 +205,7 @@ def test_bytes_that_are_no_message_end_the_conversation(viewer: Viewer):
             assert caught.value.rcvd.code == 1003
 
 
+@pytest.mark.full
 def test_a_target_that_is_no_number_gives_zero_force_and_a_fault(rod: Surrogate):
     with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
         before = held(client, -0.3).faults
@@ -216,6 +217,7 @@ def test_a_target_that_is_no_number_gives_zero_force_and_a_fault(rod: Surrogate)
         assert math.hypot(*held(client, -0.3).force) > 0.5  # and is forgiven afterwards
 
 
+@pytest.mark.full
 def test_the_end_of_the_loop_is_told_and_the_force_is_zero(rod: Surrogate, caplog: pytest.LogCaptureFixture):
     with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
         held(client, -0.3)
@@ -230,7 +232,7 @@ def test_the_end_of_the_loop_is_told_and_the_force_is_zero(rod: Surrogate, caplo
     assert "real-time process has ended" in caplog.text
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_standing_loop_is_noticed(rod: Surrogate):
     with Viewer(rod, port=0) as viewer, client_of(viewer) as client:
         held(client, -0.3)
@@ -242,7 +244,7 @@ def test_a_standing_loop_is_noticed(rod: Surrogate):
         assert (frame.loop, frame.force) == (Loop.FROZEN, (0.0, 0.0, 0.0))
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_loop_that_stands_in_the_midst_of_a_tick_is_frozen_too(
     rod: Surrogate, monkeypatch: pytest.MonkeyPatch
 ):

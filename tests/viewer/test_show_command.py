@@ -16,7 +16,7 @@ from palpate.physics.vtu import write_pvd
 from palpate.viewer.messages import Shown
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.skipif(os.name != "posix", reason="signals of a terminal are POSIX")
 def test_a_series_is_served_until_interrupted(tmp_path: Path):
     solutions = dents(2)
@@ -38,6 +38,7 @@ def test_a_series_is_served_until_interrupted(tmp_path: Path):
     assert {field.name for field in shown.fields} == {"displacement", "von Mises stress", "largest strain"}
 
 
+@pytest.mark.full
 def test_a_file_that_is_none_is_a_usage_error(tmp_path: Path):
     done = subprocess.run(
         [sys.executable, "-m", "palpate", "show", str(tmp_path / "no.vtu")],

@@ -12,7 +12,7 @@ from palpate.physics.shapes import Block
 from palpate.physics.solid import Body
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_force_of_springs_beside_finite_elements():
     tissue = NeoHookean(young=9e3, poisson=0.45)
     body = Body(Block((0.06, 0.06, 0.03)), tissue, fixed="bottom")

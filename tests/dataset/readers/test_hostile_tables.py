@@ -96,6 +96,7 @@ def largest_memory():
     )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_file_is_refused(tmp_path, name):
     if name.endswith((".vtk", ".parquet")):
@@ -120,6 +121,7 @@ def fill_memory(path):
     return len(kept)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("fault", "reason"), [(crash, "SIGABRT"), (fill_memory, "GB of memory")])
 def test_a_reader_that_is_ended_is_an_error_here(tmp_path, fault, reason):
     (tmp_path / "a.vtu").write_text("x")

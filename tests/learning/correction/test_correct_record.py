@@ -51,6 +51,7 @@ def test_depths_and_normal_forces_alone_correct_a_surrogate():
     np.testing.assert_allclose(done.surrogate.energy.force(position)[:, 2], forces, rtol=0.02, atol=0.005)
 
 
+@pytest.mark.full
 def test_errors_left_out_are_those_of_new_measurements():
     S = model()
     specimen, rng = Phantom(S), np.random.default_rng(1)
@@ -66,7 +67,7 @@ def test_errors_left_out_are_those_of_new_measurements():
     assert correct(Surrogate(S), record(X[:5], specimen.force(X[:5]))).left_out is None
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_units_that_are_wrong_by_a_thousand_are_suspicious():
     S = model()
     X = touches(30, 3)

@@ -62,6 +62,7 @@ def test_a_raised_surface_is_nearer_by_its_height_everywhere():
         raise_surface(S.baseline.touched, 0.005, RADIUS)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("factor", [0.5, 1.4, 2.5])
 def test_a_constant_factor_is_found_to_within_the_bound_of_the_noise(factor):
     """One unknown: no unbiased estimate of ln m is surer than σ/√Σ‖F‖² (Cramér & Rao)."""
@@ -255,6 +256,7 @@ def test_windows_bound_what_is_kept_and_change_little():
     assert np.median(apart / a.deviation(test)) < 1.0
 
 
+@pytest.mark.full
 def test_a_memory_follows_a_specimen_that_softens():
     S = model()
     rng = np.random.default_rng(19)

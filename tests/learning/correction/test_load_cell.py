@@ -41,6 +41,7 @@ def record(X, F, along=None):
     return Measurements(X, F, along, np.full(len(X), np.nan), 0.01 * np.arange(len(X)))
 
 
+@pytest.mark.full
 def test_an_offset_is_found_in_air_and_is_no_height():
     X, F = forces()
     heights = []
@@ -57,6 +58,7 @@ def test_an_offset_is_found_in_air_and_is_no_height():
     assert done.as_dict()["load_cell"]["offset"][2] == pytest.approx(0.03, abs=0.005)
 
 
+@pytest.mark.full
 def test_a_drift_is_found_in_air():
     X, F = forces()
     rate = 0.02  # N/s
@@ -66,6 +68,7 @@ def test_a_drift_is_found_in_air():
     assert done.offset[0] == pytest.approx(HEIGHT, abs=1e-4)
 
 
+@pytest.mark.full
 def test_one_component_alone_has_an_offset_too():
     X, F = forces()
     along = np.tile([0.0, 0.0, 1.0], (len(X), 1))
@@ -85,6 +88,7 @@ def test_without_readings_in_air_height_and_offset_are_called_alike():
     assert "in air" in done.warning
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("fault", ["stuck", "saturated", "sign", "lags"])
 def test_faulty_sensors_are_named(fault):
     X, F = forces()
@@ -102,6 +106,7 @@ def test_faulty_sensors_are_named(fault):
     assert {"stuck": "stuck", "saturated": "saturated", "sign": "sign", "lags": "lags by 4"}[fault] in text
 
 
+@pytest.mark.full
 def test_a_sound_sensor_is_not_accused():
     X, F = forces()
     assert correct(body(), record(X, F)).cell.faults == ()

@@ -81,6 +81,7 @@ def test_sliders_are_found_to_the_grid_and_answer_unseen_histories() -> None:
     assert "elements" in str(fit)
 
 
+@pytest.mark.full
 def test_dashpots_are_found_to_the_grid() -> None:
     rng = np.random.default_rng(6)
 

@@ -134,6 +134,7 @@ def test_the_tip_converges_with_fibres_and_elements(ratio, modulus):
     assert errors[2] < errors[0] / 8
 
 
+@pytest.mark.full
 def test_the_collapse_load():
     """M_p/L: found from above, nearer the finer the mesh, and as hardening vanishes."""
     body = beam(elements=80, fibres=96)
@@ -184,7 +185,7 @@ def test_a_loop_without_hardening_is_the_virgin_curve_at_twice_the_scale():
     assert twice == pytest.approx(once, rel=1e-6)
 
 
-@pytest.mark.parametrize("kinematics", [pytest.param("large", marks=pytest.mark.slow), "small"])
+@pytest.mark.parametrize("kinematics", [pytest.param("large", marks=pytest.mark.full), "small"])
 def test_work_is_stored_or_dissipated(kinematics):
     """∮ P du over a cycle, by the trapezoidal rule on two step sizes."""
     material = Plastic(ELASTIC, VoceHardening(YIELD, 60e6, 400.0, 1e9))
@@ -263,6 +264,7 @@ def test_a_failed_load_ends_the_history():
     assert bad.stop is Stop.BAD_INPUT
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", list(HISTORY_PRESETS))
 def test_presets_with_a_history_converge_at_their_corners_and_refuse_pointless_loads(name):
     problem = preset(name).problem()

@@ -120,6 +120,7 @@ def test_forces_and_tangents_of_a_step_are_derivatives(large):
 # beams
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("terms", [ONE, TWO])
 def test_a_small_load_creeps_by_the_compliance(terms):
     times = np.array([0.0, 0.01, 0.1, 0.5, 1.0, 3.0, 10.0, 40.0])
@@ -187,6 +188,7 @@ def test_the_load_goes_and_the_bend_fades():
     assert abs(tip(path[5])) < 1e-6 * tip(path[0])
 
 
+@pytest.mark.full
 def test_what_came_before_is_forgotten():
     body = beam(tolerance=1e-4)
     quiet = march(body, [0.0, 2.0, 2.0], [5.0, 6.0, 60.0])
@@ -195,7 +197,7 @@ def test_what_came_before_is_forgotten():
     assert tip(quiet[2]) == pytest.approx(tip(wild[3]), rel=2e-4)  # of what each is off by itself
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_cycles_loss_is_that_of_the_loss_compliance():
     """π P² J''(ω) u_0/P a cycle, with J* = 1/g*, for a small sine made of straight pieces."""
     frequency, prony = 1.5, PronySeries(ONE)
@@ -217,6 +219,7 @@ def test_a_cycles_loss_is_that_of_the_loss_compliance():
     assert work == pytest.approx(fine, rel=2 * (2 * np.pi / 24) ** 2 / 6)
 
 
+@pytest.mark.full
 def test_the_tolerance_is_kept():
     times, loads = [0.0, 0.3, 3.0], [5.0, 5.0, 5.0]
     best = march(beam(tolerance=1e-7), loads, times)
@@ -249,7 +252,7 @@ def test_a_load_without_a_history_is_put_on_at_once():
     np.testing.assert_allclose(solution.root_reaction, wanted.root_reaction, atol=1e-8)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_column_that_creeps_buckles_in_time():
     """π²EI/4L² = 2.42 N at once and half of that in the end (Euler 1744): 1.8 N stands at first only.
 

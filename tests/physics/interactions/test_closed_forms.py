@@ -171,6 +171,7 @@ def test_effects_of_small_loads_add_up():
     assert both.response == pytest.approx(gradient @ (1e-6, 1e-3), rel=1e-4)
 
 
+@pytest.mark.full
 def test_a_point_force_is_the_same_on_any_mesh():
     """Its spread size decides the displacement under it, not the elements."""
     found = [

@@ -77,6 +77,7 @@ def test_response_is_the_energy_s_slope(case):
     np.testing.assert_allclose(slopes, response, atol=1e-5 * np.abs(response).max())
 
 
+@pytest.mark.full
 def test_response_gradient_is_the_response_s_slope_and_symmetric(case):
     solver, q, steps = case
     solution = solver.solve(q)

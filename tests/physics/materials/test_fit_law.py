@@ -85,6 +85,7 @@ def test_constants_are_recovered(name, law, constants, measure):
     assert found.stability
 
 
+@pytest.mark.full
 def test_the_interval_holds_the_truth_as_often_as_it_says():
     law = pp.materials.MooneyRivlin.with_poisson(0.5, c10=2e3, c01=5e2)
     clean, rng = records_of(law, ("uniaxial",)), np.random.default_rng(5)
@@ -105,6 +106,7 @@ def test_the_interval_holds_the_truth_as_often_as_it_says():
     assert 36 <= sum(inside) < 60
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("weight", ["peak", "stress"])
 def test_treloars_rubber_is_fitted_no_worse_than_by_the_constants_of_1972(treloar, weight):
     found = fit("ogden-3", treloar, weight=weight)
@@ -114,6 +116,7 @@ def test_treloars_rubber_is_fitted_no_worse_than_by_the_constants_of_1972(treloa
     assert found.stability
 
 
+@pytest.mark.full
 def test_of_the_laws_that_are_stable_the_best_is_chosen(treloar):
     found = fit(None, treloar)
     assert found.law == "ogden-3"
@@ -192,6 +195,7 @@ def test_two_moduli_of_a_compressible_law_come_back_exactly():
     assert all(c.high - c.low < 1e-4 * c.value for c in found.constants)
 
 
+@pytest.mark.full
 def test_terms_of_a_compressible_ogden_law_come_back():
     law = pp.materials.Ogden.with_poisson(0.45, mu=(1e3, -40.0), alpha=(1.8, -4.0))
     found = fit("ogden-2", records_of(law, ("equibiaxial", "planar")), poisson=0.45)

@@ -34,6 +34,7 @@ def test_an_exact_record_gives_its_terms_back(terms, ramp):
     np.testing.assert_allclose(found.model(TIME), record(TIME, terms, ramp), rtol=1e-7)
 
 
+@pytest.mark.full
 def test_a_noisy_record_gives_them_within_their_intervals():
     rng = np.random.default_rng(1)
     inside = []

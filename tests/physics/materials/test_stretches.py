@@ -60,6 +60,7 @@ def cube():
     return space, np.array(modes)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("a", EXPONENTS)
 def test_energy_gradient_and_second_derivative_in_a_finite_element(a, cube):
     import ngsolve as ng

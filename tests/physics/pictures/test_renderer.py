@@ -155,6 +155,7 @@ def test_the_probe_the_cut_and_the_colours_change_the_picture_where_they_should(
         assert np.mean(np.abs(coloured - brightest).max(axis=2) < 0.15) > 1e-4
 
 
+@pytest.mark.full
 def test_a_picture_is_saved_where_asked(made: Made, tmp_path: Path):
     picture = plot_solution(made, "von_mises", path=tmp_path / "one.png", edges=True, scale=1.5)
     assert matplotlib.image.imread(tmp_path / "one.png").shape[:2] == (680, 1000)
@@ -179,6 +180,7 @@ def test_what_cannot_be_drawn_is_said(made: Made):
         plot_solution(made.with_(displacement=np.full_like(made.displacement, np.nan)))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("colour", "unit"), [("displacement", "mm"), ("von_mises", "kPa"), ("largest_strain", "%")]
 )

@@ -37,6 +37,7 @@ def test_shells_apart_are_no_fault(tmp_path, offset):
     assert len(ImportedSolid(path, unit="mm").surfaces) == 12
 
 
+@pytest.mark.full
 def test_a_crash_of_the_mesher_is_an_error_here(stacked, monkeypatch):
     monkeypatch.setattr(surface_checks, "touching_shells", lambda surface: None)
     with pytest.raises(SolverError, match="SIGABRT") as caught:
@@ -65,6 +66,7 @@ class Deadly:
         os.abort()
 
 
+@pytest.mark.full
 def test_a_crash_of_a_solver_is_an_error_here():
     with pytest.raises(SolverError, match="while solving: its process was ended by SIGABRT"):
         apart.solve_apart(Deadly(), np.zeros(1), {})

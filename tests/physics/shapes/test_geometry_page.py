@@ -13,6 +13,7 @@ import palpate.physics.shapes as package
 PAGE = (Path(__file__).parents[3] / "docs" / "guide" / "geometry.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.full
 def test_the_programs_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
     monkeypatch.chdir(tmp_path)
     exec("\n".join(re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)), {"__name__": "page"})

@@ -346,6 +346,7 @@ def test_cells_that_are_not_read_are_refused_with_their_number(tmp_path: Path):
     assert f"3 of {len(TETS)} cells of volume" in refused(mesh_of(path))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["tissue", "PhysicalIds", "Zone", "attribute"])
 @pytest.mark.parametrize("kind", [np.int32, np.uint8, float])
 def test_whole_numbers_of_any_name_are_labels(tmp_path: Path, name: str, kind: type):

@@ -52,6 +52,7 @@ def kind(shape) -> str:
     return type(shape).__name__ + ("+" if shape is PHANTOM else "")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape", SHAPES, ids=kind)
 def test_the_surface_is_closed_and_faces_outwards(shape):
     mesh = shape.rest()
@@ -89,6 +90,7 @@ def test_volume_is_that_of_the_formula(shape):
     assert ngsolve.Integrate(1, shape.mesh()) == pytest.approx(VOLUMES[shape], rel=tolerance)
 
 
+@pytest.mark.full
 def test_curved_volume_and_area_converge_at_fourth_order_and_straight_ones_at_second():
     exact, area = VOLUMES[Cylinder()], 2 * PI * 0.05 * 0.05
     sizes = np.array([0.024, 0.012, 0.006])
@@ -190,8 +192,8 @@ def test_a_rectangle_of_a_few_millimetres_is_fine_too(size):
         Cylinder(),
         Dome(element=0.02),
         Tube(0.02, 0.05, 0.1),
-        pytest.param(PHANTOM, marks=pytest.mark.slow),
-        pytest.param(Organ(element=0.02), marks=pytest.mark.slow),
+        pytest.param(PHANTOM, marks=pytest.mark.full),
+        pytest.param(Organ(element=0.02), marks=pytest.mark.full),
     ],
     ids=kind,
 )
@@ -209,7 +211,7 @@ def test_round_shapes_are_fine_where_asked(shape):
     assert mesh.surfaces == shape.surfaces
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_meshes_are_the_same_in_another_process():
     command = [sys.executable, "-c", PROGRAM.format(shapes=SAME)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -244,7 +246,7 @@ def test_the_way_to_ngsolve_and_back():
         assert flux == pytest.approx(3 * mesh.volume, rel=1e-10)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.parametrize("seed", [1, 2, 7])
 def test_organs_of_other_seeds(seed: int):
     mesh = Organ(seed=seed).rest()
@@ -254,7 +256,7 @@ def test_organs_of_other_seeds(seed: int):
     assert not np.isclose(mesh.volume, Organ().rest().volume, rtol=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_fine_organ_has_the_nodes_of_a_surgical_model():
     assert len(Organ(element=0.006).rest().points) >= 4293
 

@@ -80,6 +80,7 @@ def test_borders_of_labels_stay():
     assert len(simple.triangles) < 2000
 
 
+@pytest.mark.full
 def test_large_files_are_simplified_and_told(tmp_path: Path):
     ball = trimesh.creation.icosphere(subdivisions=5, radius=50)
     ball.export(path := tmp_path / "ball.stl")

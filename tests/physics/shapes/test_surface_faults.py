@@ -173,6 +173,7 @@ def test_shells_that_meet_in_a_point_are_refused(path: Path):
     assert "(0.02, 0.02, 0.02) m" in said
 
 
+@pytest.mark.full
 def test_a_body_inside_a_body_is_refused_and_a_cavity_is_none(path: Path):
     outer, inner = box((40, 40, 40), (0, 0, 0)), box((20, 20, 20), (10, 10, 10))
     said = refused(read(path, binary(trimesh.util.concatenate([outer, inner]).triangles)))

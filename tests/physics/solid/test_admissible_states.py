@@ -63,7 +63,7 @@ def test_the_winding_number_tells_inside_from_outside(field):
     assert winding_number(mesh.points, mesh.triangles, np.array(SIZE) * 1.01) == pytest.approx(0, abs=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.filterwarnings("ignore:The pad of the probe takes")  # so soft on purpose
 def test_a_pad_without_a_stop_swallows_the_sphere_and_the_solver_says_so():
     """A merely quadratic pad has a limit point: beyond it no state that pushes back is left."""
@@ -80,6 +80,7 @@ def test_a_pad_without_a_stop_swallows_the_sphere_and_the_solver_says_so():
             assert one.penetration < RADIUS
 
 
+@pytest.mark.full
 def test_the_pad_is_never_pressed_past_its_stop():
     """Forced deeper than the body yields, the pad takes what is left, and its stop holds."""
     soft = SphereProbe(radius=RADIUS, pad=1e5, stop=0.002)

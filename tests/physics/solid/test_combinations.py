@@ -104,7 +104,7 @@ BODIES = {
 
 
 SLOW = {"layered", "organ", "tube", "stl"}  # many elements
-MARKED = {kind: pytest.param(kind, marks=pytest.mark.slow) if kind in SLOW else kind for kind in BODIES}
+MARKED = {kind: pytest.param(kind, marks=pytest.mark.full) if kind in SLOW else kind for kind in BODIES}
 
 
 @pytest.mark.parametrize("kind", MARKED.values())
@@ -168,6 +168,7 @@ def test_depths_on_a_dome_are_measured_to_the_round_surface():
     assert np.abs(distance).max() < (edge / 4) ** 2 / (8 * 0.05) * 2
 
 
+@pytest.mark.full
 def test_a_viscoelastic_block_recovers_after_the_probe_has_gone():
     law = Viscoelastic(gel(), ((0.5, 1.0),))
     problem = Body(Block(SIZE, element=0.02), law).problem(SphereProbe(SMALL), element=0.01)
@@ -187,6 +188,7 @@ def test_a_viscoelastic_block_recovers_after_the_probe_has_gone():
     assert all(one.potential_energy > 0 for one in found[:4])
 
 
+@pytest.mark.full
 def test_a_plastic_block_keeps_a_dent():
     law = Plastic(LinearElastic(1e6, 0.35), LinearHardening(1e4, 2e4))
     probe = SphereProbe(SMALL, pad=1e8, stop=0.001)
@@ -202,7 +204,7 @@ def test_a_plastic_block_keeps_a_dent():
     assert 0 < found[2].potential_energy < 0.5 * found[1].potential_energy
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_layers_of_three_kinds_stand_on_each_other():
     """Elastic in mixed form, viscoelastic and plastic: the force relaxes, a dent stays, U is finite throughout."""
     shape = LayeredBlock(

@@ -57,6 +57,7 @@ def test_scattered_points_are_grouped_with_their_neighbours_from_shallow_to_deep
     assert max(widths) < 0.8 * np.ptp(points[:, :2], axis=0).max()
 
 
+@pytest.mark.full
 def test_columns_on_a_dome_are_chains_too():
     dome, probe = Dome(radius=0.06), SphereProbe(radius=RADIUS, depth=(0.0, 0.008))
     points = probe.design(dome, 36, 0)
@@ -112,6 +113,7 @@ def test_other_interactions_leave_the_design_to_the_caller():
     assert [list(chain) for chain in problem.chains(np.zeros((3, 1)))] == [[0, 1, 2]]
 
 
+@pytest.mark.full
 def test_contact_points_are_denser_where_the_surface_ends():
     whole = SphereProbe(0.01, depth=(0.0, 0.005), over=((0.0, 0.0), (0.1, 0.1)))
     corner = replace(whole, over=((0.05, 0.0), (0.1, 0.05)))

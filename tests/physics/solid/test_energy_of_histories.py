@@ -24,6 +24,7 @@ def under_probe(material, **options):
     return Body(Block(SIZE, element=0.03), material, **options).problem(PROBE, element=ELEMENT)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("poisson", [0.45, 0.5])
 def test_in_an_instant_force_and_energy_are_those_of_the_elastic_law(poisson):
     """Nothing flows: U is the elastic one, and its derivatives are force and stiffness."""
@@ -50,6 +51,7 @@ LAWS = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("form", ["displacement", "mixed"])
 @pytest.mark.parametrize("law", LAWS)
 def test_work_is_stored_and_lost(law, form):

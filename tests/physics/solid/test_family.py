@@ -34,6 +34,7 @@ def problem() -> FamilyProblem:
     return FAMILY.problem(PROBE, element=0.012)
 
 
+@pytest.mark.full
 def test_a_member_answers_as_the_body_that_it_is() -> None:
     member = FAMILY.member((5e3, 0.4))
     assert member.materials["fat"].young == 5e3
@@ -48,6 +49,7 @@ def test_a_member_answers_as_the_body_that_it_is() -> None:
     np.testing.assert_array_equal(found.inputs, (*CENTRE, 5e3, 0.4))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("gravity", [(0.0, 0.0, 0.0), (0.0, 0.0, -9.81)])
 def test_the_response_to_a_property_is_the_slope_of_the_energy(gravity: tuple[float, float, float]) -> None:
     # envelope theorem: ∂U/∂p at the equilibrium is the partial derivative at the same displacement
@@ -83,6 +85,7 @@ def test_columns_each_belong_to_one_member() -> None:
     assert (values <= high).all()
 
 
+@pytest.mark.full
 def test_a_sweep_over_a_family_is_a_dataset_like_any() -> None:
     shape = Block((0.06, 0.06, 0.03), element=0.02)
     family = BodyFamily(Body(shape, NeoHookean(9e3, 0.4)), Varied("young", 5e3, 15e3))
@@ -97,7 +100,7 @@ def test_a_sweep_over_a_family_is_a_dataset_like_any() -> None:
     assert row["potential_energy"][0] == pytest.approx(again.potential_energy, rel=1e-7)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_layers_of_other_thickness_have_the_same_elements_moved() -> None:
     family = BodyFamily(layered(), Varied("fat.thickness", 0.010, 0.020))
     whole = family.problem(PROBE, element=0.008)
@@ -120,6 +123,7 @@ def test_layers_of_other_thickness_have_the_same_elements_moved() -> None:
     assert family.problem(PROBE).describe()["varied"] == [{"path": "fat.thickness", "range": [0.010, 0.020]}]
 
 
+@pytest.mark.full
 def test_a_probe_of_any_size_lies_as_deep_over_the_same_places() -> None:
     family = BodyFamily(layered(), (Varied("fat.young", 2e3, 8e3), Varied("probe.radius", 0.008, 0.012)))
     whole = family.problem(PROBE, element=0.012)
@@ -165,7 +169,7 @@ def test_what_can_not_vary_is_said() -> None:
     assert isinstance(problem().member((4e3, 0.4)), SolidProblem)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_stress_is_in_every_row_that_asks_for_it() -> None:
     """Of a body and of a family; which questions are asked of a problem is part of its identity."""
     for whole, places in ((layered(), (CENTRE,)), (FAMILY, ((*CENTRE, 5e3, 0.4),))):

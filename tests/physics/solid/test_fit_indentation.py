@@ -52,6 +52,7 @@ def solved():
     return IndentationTest(DEPTHS, [4 * f.response[2] for f in found], RADIUS, THICKNESS, WIDTH)
 
 
+@pytest.mark.full
 def test_the_modulus_of_own_solves_is_recovered_within_a_percent(solved, tmp_path):
     found = fit(None, solved, poisson=0.45)
     assert found.material.young == pytest.approx(12e3, rel=0.01)
@@ -63,7 +64,7 @@ def test_the_modulus_of_own_solves_is_recovered_within_a_percent(solved, tmp_pat
     found.plot(tmp_path / "fit.png")
 
 
-@pytest.mark.slow
+@pytest.mark.full
 @pytest.mark.filterwarnings("ignore:The _QuarterProbe has a radius:palpate.physics.advice.ModelWarning")
 def test_the_modulus_of_theorys_curve_is_recovered_within_a_percent():
     """Small depths of a large ball on a bonded layer, as an integral equation has them."""

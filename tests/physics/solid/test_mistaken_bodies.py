@@ -159,6 +159,7 @@ def test_elements_that_are_larger_than_the_probe_are_warned_of():
         BODY.problem(SphereProbe(radius=0.006, depth=(0.0, 0.004)), element=0.02)
 
 
+@pytest.mark.full
 def test_a_hopeless_solve_is_given_up(monkeypatch):
     """A ball that is pressed through nearly all of a body: several tries in a row fail, and it says so."""
     monkeypatch.setattr("palpate.physics.solid.solid_path.FUTILE_SECONDS", 0.0)

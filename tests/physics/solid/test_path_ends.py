@@ -88,6 +88,7 @@ def test_chord_steps_are_counted_and_told(solver):
     assert f"+ {found.chords} steps with a reused tangent" in str(found)
 
 
+@pytest.mark.full
 def test_a_chain_before_a_reset_does_not_change_a_bit():
     """Also where no interaction's energy brings its own tangent: prescribed displacements."""
     chain, other = ([-0.001], [-0.002]), ([0.004], [0.008])
@@ -111,6 +112,7 @@ def test_a_prescribed_displacement_takes_the_body_along_from_the_start():
     assert found.iterations <= 12
 
 
+@pytest.mark.full
 def test_a_failed_solve_can_be_looked_at(solver):
     solver.reset()
     found = solver.solve((0.03, 0.03, 0.01))

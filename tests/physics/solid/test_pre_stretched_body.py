@@ -78,7 +78,7 @@ def drawn_out(stretch, thinning, planes):
     return Body(Block((side, side, height)), GEL, fixed=(), held=(*planes, *moved))
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_ball_feels_the_same_as_on_a_body_that_was_really_stretched():
     """What stretching by 1.3 takes from the force is found to a tenth, which is what the two meshes differ by."""
     stretch, planes = 1.3, (roller("x_min", "x"), roller("y_min", "y"), roller("bottom", "z"))

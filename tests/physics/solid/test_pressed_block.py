@@ -143,7 +143,7 @@ def test_a_column_extrapolates_from_depth_to_depth():
     assert all(0 < one.penetration < 0.98 * PROBE.stop for one in found)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_forms_agree_as_the_mesh_gets_finer():
     """At ν = 0.45 both have the same limit: their difference falls at least as fast as the element size."""
 
@@ -155,6 +155,7 @@ def test_forms_agree_as_the_mesh_gets_finer():
     assert 0 < difference(0.006) < 0.5 * difference(0.012)
 
 
+@pytest.mark.full
 def test_the_mixed_form_is_chosen_and_does_not_lock():
     """From ν = 0.499 to 0.4999 displacements alone stiffen with the mesh's locking; the mixed form hardly."""
     assert pressed(0.47).body.mixed_regions == ()

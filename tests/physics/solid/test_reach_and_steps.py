@@ -72,7 +72,7 @@ def pressed(solver, depths):
     return solver.march(np.arange(1.0, len(depths) + 1), [above(d) for d in depths])
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_the_force_on_a_plastic_body_does_not_depend_on_the_steps_asked_for(metal):
     """A march in one step, in four, and a solve from rest agree within a few errors of a step."""
     solver, deep = metal.open(), 0.0012
@@ -81,7 +81,7 @@ def test_the_force_on_a_plastic_body_does_not_depend_on_the_steps_asked_for(meta
     assert np.ptp(forces) < 2 * metal.body.step_error * forces[0]
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_smaller_error_of_a_step_comes_closer_to_many_steps(metal):
     deep = 0.0012
     free = dataclasses.replace(metal, body=dataclasses.replace(metal.body, step_error=math.inf)).open()
@@ -95,7 +95,7 @@ def test_a_smaller_error_of_a_step_comes_closer_to_many_steps(metal):
     assert errors[2] < 3 * 3e-4
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_an_instant_of_a_plastic_body_is_the_same_whatever_was_before(metal):
     solver = metal.open()
     first = solver.solve(above(0.0008))

@@ -52,6 +52,7 @@ def test_a_held_probe_feels_the_force_relax_to_the_slow_limit(solver, elastic):
     assert forces[-1] == pytest.approx(relaxed, rel=1e-3)
 
 
+@pytest.mark.full
 def test_an_instant_leaves_the_history_alone(solver):
     def last(interlude):
         solver.reset()
@@ -64,6 +65,7 @@ def test_an_instant_leaves_the_history_alone(solver):
     assert np.linalg.norm(after - alone) <= 1e-9 * np.linalg.norm(alone)
 
 
+@pytest.mark.full
 def test_a_failed_step_leaves_the_history_as_it_was(solver):
     def last(failing):
         solver.reset()

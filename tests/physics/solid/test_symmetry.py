@@ -26,6 +26,7 @@ SOFT = NeoHookean(9e3, 0.45)
 CUBE = Block((0.1, 0.1, 0.1))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("shape", "count"),
     [

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from standins import STIFFNESS
 
 from palpate.errors import DeviceError, UsageError
 from palpate.network import shared_memory
 from palpate.runtime import Fault, LoopProcess, now
 from palpate.runtime.recording import Ring
+from standins import STIFFNESS
 
 POSIX = pytest.mark.skipif(os.name != "posix", reason="signals and process ids are POSIX's")
 TICK = 1e-3

@@ -115,7 +115,7 @@ def _let_go(surrogate: Surrogate, X: np.ndarray) -> list[bool]:
     """
     body = touchable(surrogate)
     assert body.surface is not None
-    loop, (low, high) = body.evaluator(), body.surface.box
+    loop, (low, high) = body.evaluator(few=True), body.surface.box
     far = float(np.linalg.norm(high - low))
     ways = np.linspace(0.0, far, max(2, int(_STEPS * far / body.surface.radius)))
     gone = []

@@ -26,11 +26,12 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import cfunc, njit, types
+from numba import cfunc, types
 from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
 from palpate.devices.openhaptics_library import DONE, GOING_ON, Code
+from palpate.kernels import part
 
 __all__ = [
     "CAUSE",
@@ -50,7 +51,6 @@ __all__ = [
 FIRST = 50  # frames at the start whose places and velocities are kept
 SILENCE = 1.0  # cause of a stop: the loop was silent; all others are the library's errors
 _extension: Any = intrinsic  # whose own types know nothing of the typing context that it takes away
-_jit = njit(cache=True, error_model="numpy")
 _POSITION, _VELOCITY, _FORCE = Code.POSITION, Code.VELOCITY, Code.FORCE
 _BUTTONS, _INKWELL, _SWITCH = Code.BUTTONS, Code.INKWELL, Code.SAFETY_SWITCH
 _MOST_ERRORS = 64  # a list that is longer doesn't end
@@ -171,7 +171,7 @@ def servo() -> Any:
     return cfunc(types.uint32(types.voidptr), cache=True)(_called)
 
 
-@_jit
+@part
 def _choose_force(box, written, x, y, z):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Take a force that was written whole, and zero where the loop is silent or has not answered to a stop."""
     if written == box[WRITTEN] and written % 2.0 == 0.0:
@@ -188,7 +188,7 @@ def _choose_force(box, written, x, y, z):  # type: ignore[no-untyped-def]  # noq
         box[PUSH], box[PUSH + 1], box[PUSH + 2] = 0.0, 0.0, 0.0
 
 
-@_jit
+@part
 def _take_errors(box, words):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Take all errors of the library, the newest first; returns whether another frame may be begun."""
     may_begin, stopped = True, False

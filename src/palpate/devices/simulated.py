@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 
 from palpate.devices.device import Driver, Sample, Traits
 from palpate.devices.profiles import device_profile
 from palpate.errors import UsageError
+from palpate.kernels import kernel, part
 
 __all__ = ["SimulatedHand", "SimulatedSettings"]
 
@@ -33,8 +33,6 @@ _LONGEST_DELAY, _LONGEST_STRETCH = 0.015, 0.1
 _WAVES = 6  # of the random script: tremor has 8 to 12 Hz, voluntary motion ends near 6
 _SLOWEST, _FASTEST = 0.2, 8.0  # Hz, of the random script's waves
 _RISE = 0.2  # s, of a press
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @dataclass(frozen=True)
@@ -204,7 +202,7 @@ def _recorded_path(file: str) -> np.ndarray:
     return np.column_stack([trace.time - trace.time[0], trace.ticks["hand"]])
 
 
-@_jit
+@part
 def _scripted(shape, time, i, toward, along, amplitude, frequency, frequencies, phases):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     if shape == 0:
         return amplitude * along[i] * math.sin(2.0 * math.pi * frequency * time)
@@ -218,7 +216,7 @@ def _scripted(shape, time, i, toward, along, amplitude, frequency, frequencies, 
     return amplitude * along[i] * (1.0 if toward >= 0.0 else 0.2)
 
 
-@_jit
+@part
 def _recorded(time, i, path):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     since = time % path[-1, 0]
     row = min(np.searchsorted(path[:, 0], since, side="right") - 1, len(path) - 2)
@@ -226,7 +224,7 @@ def _recorded(time, i, path):  # type: ignore[no-untyped-def]  # noqa: ANN001, A
     return path[row, 1 + i] + share * (path[row + 1, 1 + i] - path[row, 1 + i])
 
 
-@_jit
+@kernel
 def _integrate(place, velocity, push, clock, span, shape, along, figures, frequencies, phases, path):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     mass, damper, friction, grip, amplitude, frequency, radius = figures
     count = max(1, math.ceil(span / _STEP))
@@ -262,7 +260,7 @@ def _integrate(place, velocity, push, clock, span, shape, along, figures, freque
                 velocity[i] = 0.0
 
 
-@_jit
+@kernel
 def _delayed(past, count, seen, step, error, position):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     newest = (count - 1) % _PAST
     k, older = newest, newest

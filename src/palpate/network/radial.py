@@ -24,7 +24,8 @@ import math
 from typing import Literal, get_args
 
 import numpy as np
-from numba import njit
+
+from palpate.kernels import part
 
 __all__ = [
     "D1",
@@ -77,8 +78,6 @@ Q, T, P, D1, D2, HEAD = 0, 1, 2, 3, 4, 5
 DEGREE = 13  # degree of the Taylor polynomial of the exponential
 _GAUSSIAN, _MULTIQUADRIC = 0, 1  # places in RADIAL_FUNCTIONS
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
-
 
 def constants(dtype: type[np.floating]) -> np.ndarray:
     """Numbers that the kernels need in their own precision, so that nothing is promoted to another.
@@ -99,7 +98,7 @@ def constants(dtype: type[np.floating]) -> np.ndarray:
 _LN2_TAIL = 2.3190468138462996e-17  # ln 2 minus its nearest double
 
 
-@_jit
+@part
 def _exponential(h, work, steps, c) -> None:
     """work[P] = exp(−work[T]) for work[T] ≥ 0; T is lost."""
     c2, c3, c4, c5, c6, c7, c8, c9 = c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9]
@@ -131,7 +130,7 @@ def _exponential(h, work, steps, c) -> None:
         steps[P, k] += steps[T, k] << shift
 
 
-@_jit
+@part
 def _gaussian(h, work, steps, phi, c, order) -> None:
     for k in range(h):
         work[T, k] = work[Q, k]
@@ -144,7 +143,7 @@ def _gaussian(h, work, steps, phi, c, order) -> None:
             work[D2, k] = work[P, k]
 
 
-@_jit
+@part
 def _multiquadric(h, work, phi, c, order) -> None:
     one, first, second = c[0], c[23], c[24]
     for k in range(h):
@@ -157,7 +156,7 @@ def _multiquadric(h, work, phi, c, order) -> None:
             work[D2, k] = second * phi[k] * work[T, k] * work[T, k]
 
 
-@_jit
+@part
 def _matern(h, work, steps, phi, c, order) -> None:
     one, limit, five, third, first, second = c[0], c[18], c[19], c[20], c[21], c[22]
     for k in range(h):
@@ -175,7 +174,7 @@ def _matern(h, work, steps, phi, c, order) -> None:
             work[D2, k] = second * work[P, k]
 
 
-@_jit
+@part
 def radial_into(code, work, steps, phi, c, order) -> None:
     """phi (h,) = g(work[Q]); its derivatives into work[D1] and work[D2] if order > 0; work[Q] is lost."""
     if code == _GAUSSIAN:

@@ -214,13 +214,7 @@ class Solid(Shape):
         return mesh_solid(self.solid(), self.coarse, refinements)
 
     def check_extent(self, what: str) -> None:
-        """Refuse sizes that tell of mistaken units, and elements that the body has no room for.
-
-        Parameters
-        ----------
-        what : str
-            The shape in words, as the message begins: ``"The block"``.
-        """
+        """Refuse sizes that tell of mistaken units, and elements without room in it; `what` begins the message."""
         require_size(what, max(self.size))
         if self.element is not None and checks.positive("The element size", self.element, "m") > max(
             self.size
@@ -246,20 +240,10 @@ def _plain(shape: Hashable, refinements: tuple[FineMesh, ...]) -> BodyMesh:
 
 @dataclass(frozen=True, eq=False)
 class Isometry:
-    """A rotation or reflection M about a point p: a place X goes to p + M (X − p).
+    """A rotation or reflection M about a point p: a place X goes to p + M (X − p)."""
 
-    Attributes
-    ----------
-    matrix : (3, 3) array
-        Orthogonal matrix M.
-    about : (3,) array
-        Point p, m.
-    goes : mapping of surface to surface
-        Name of the surface onto which each goes; those not named stay where they are.
-    """
-
-    matrix: np.ndarray
-    about: np.ndarray
+    matrix: np.ndarray  # (3, 3) orthogonal matrix M
+    about: np.ndarray  # (3,) point p, m
     goes: Mapping[str, str] = field(default_factory=dict)
 
     def surface(self, name: str) -> str:

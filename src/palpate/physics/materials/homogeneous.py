@@ -118,30 +118,14 @@ def _volume(F: np.ndarray, small: bool) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """States of one kind of test.
+    """States of one kind of test: stresses and energies per undeformed area and volume, NaN without an equilibrium."""
 
-    Attributes
-    ----------
-    amount : ndarray (n,)
-        Prescribed amounts: stretches, or shear strains, or volume ratios.
-    deformation : ndarray (n, 3, 3)
-        Deformation gradients F.
-    nominal : ndarray (n, 3, 3)
-        First Piola–Kirchhoff stresses ∂W/∂F in Pa: force per undeformed area.
-    energy : ndarray (n,)
-        Densities per undeformed volume, in J/m³.
-    converged : ndarray of bool (n,)
-        True where the free directions reached a stress-free state; the rest is NaN elsewhere.
-    stress : ndarray (n,)
-        The nominal stress of the test in Pa: along the first axis, of the shear, or the mean one.
-    """
-
-    amount: np.ndarray
-    deformation: np.ndarray
-    nominal: np.ndarray
-    energy: np.ndarray
-    converged: np.ndarray
-    stress: np.ndarray
+    amount: np.ndarray  # (n,) prescribed stretches, shear strains or volume ratios
+    deformation: np.ndarray  # (n, 3, 3) deformation gradients F
+    nominal: np.ndarray  # (n, 3, 3) first Piola–Kirchhoff stresses ∂W/∂F in Pa
+    energy: np.ndarray  # (n,) J/m³
+    converged: np.ndarray  # (n,) bool, whether the free directions reached a stress-free state
+    stress: np.ndarray  # (n,) Pa, of the test: along the first axis, of the shear, or the mean one
 
     @property
     def cauchy(self) -> np.ndarray:
@@ -154,22 +138,10 @@ class Response:
 def uniaxial(
     material: Material, stretch: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """Tension (stretch > 1) or compression along the first axis, the sides free.
+    """Return tension (stretch > 1) or compression along the first axis, the sides free.
 
-    Parameters
-    ----------
-    material : Material
-        Any, also an incompressible one.
-    stretch : array_like (n,)
-        λ = length over undeformed length, positive.
-    state, dt : optional
-        Internal variables at the beginning of the step (n, …), by default the undeformed body's, and its length in s,
-        for materials with a history.
-
-    Raises
-    ------
-    UsageError
-        For stretches that are not positive and finite.
+    `stretch` (n,) is length over undeformed length. `state` holds the internal variables at the beginning of the step
+    (n, …), by default the undeformed body's, `dt` is its length in s, for materials with a history.
     """
     loaded = _amounts(stretch, "stretch")
     F = _unit(loaded)
@@ -181,13 +153,7 @@ def uniaxial(
 def equibiaxial(
     material: Material, stretch: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """Stretch λ along the first two axes alike, the third free; arguments as of `uniaxial`.
-
-    Raises
-    ------
-    UsageError
-        For stretches that are not positive and finite.
-    """
+    """Return the stretch λ along the first two axes alike, the third free; arguments as of `uniaxial`."""
     loaded = _amounts(stretch, "stretch")
     F = _unit(loaded)
     F[:, 0, 0] = F[:, 1, 1] = loaded
@@ -198,13 +164,7 @@ def equibiaxial(
 def planar(
     material: Material, stretch: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """Stretch λ along the first axis, none along the second, the third free ("pure shear"); arguments as of `uniaxial`.
-
-    Raises
-    ------
-    UsageError
-        For stretches that are not positive and finite.
-    """
+    """Return the stretch λ along the first axis, none along the second, the third free ("pure shear")."""
     loaded = _amounts(stretch, "stretch")
     F = _unit(loaded)
     F[:, 0, 0] = loaded
@@ -215,13 +175,7 @@ def planar(
 def simple_shear(
     material: Material, shear: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """F = I + γ e₁ ⊗ e₂ for shear strains γ (n,); `state` and `dt` as of `uniaxial`.
-
-    Raises
-    ------
-    UsageError
-        For strains that are not finite.
-    """
+    """Return F = I + γ e₁ ⊗ e₂ for shear strains γ (n,); `state` and `dt` as of `uniaxial`."""
     loaded = _amounts(shear, "shear strain", positive=False)
     F = _unit(loaded)
     F[:, 0, 1] = loaded
@@ -231,13 +185,7 @@ def simple_shear(
 def volumetric(
     material: Material, ratio: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """F = J^(1/3) I for volume ratios J (n,); `state` and `dt` as of `uniaxial`.
-
-    Raises
-    ------
-    UsageError
-        For ratios that are not positive and finite, or an incompressible material.
-    """
+    """Return F = J^(1/3) I for volume ratios J (n,) of a compressible material; `state` and `dt` as of `uniaxial`."""
     loaded = _amounts(ratio, "volume ratio")
     if is_incompressible(material):
         raise incompressible(material.name)

@@ -138,20 +138,8 @@ def stability(
 ) -> Stability:
     """Test a material over ranges of strain; a material with a history, in its first step of `dt` seconds.
 
-    Parameters
-    ----------
-    material : Material
-        Any.
-    strain : tuple of float, or mapping of mode to it
-        Range of λ − 1 in uniaxial, equibiaxial and planar tests, and of γ in simple shear; from above −1. A mapping
-        gives each of these four modes a range of its own.
-    volume : tuple of float
-        Range of J − 1.
-
-    Raises
-    ------
-    UsageError
-        If a range is empty, does not hold 0, or begins at −1 or below.
+    `strain` is the range of λ − 1 in uniaxial, equibiaxial and planar tests, and of γ in simple shear, from above −1; a
+    mapping gives each of these four modes a range of its own. `volume` is the range of J − 1. Each holds 0.
     """
     ranges = strain if isinstance(strain, Mapping) else {mode: strain for mode, _, _ in _MODES}
     ranges = {**ranges, "volumetric": volume}

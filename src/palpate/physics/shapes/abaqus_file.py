@@ -130,18 +130,11 @@ def _blocks(path: str, name: Path, depth: int = 0) -> Iterator[_Block]:
 
 
 def read_abaqus(path: str) -> MeshSource:
-    """Read the mesh of an input file.
+    """Read the mesh of an input file; FileFormatError and UsageError tell what is damaged, missing or not read.
 
     Regions are the sets of the solid sections, and where an element has none, its smallest set. Instances of an
     assembly are placed where it says; with several, their names stand before those of the sets. Surfaces are
     ``*SURFACE``, sets of nodes, and shell elements by their sets.
-
-    Raises
-    ------
-    FileFormatError
-        If the file holds no nodes, or numbers that belong to nothing.
-    UsageError
-        If the mesh is to be made by keywords that are not read, or a file that it includes is missing.
     """
     parts: dict[str, _Part] = {}
     root = _Part("")

@@ -129,12 +129,9 @@ def bodies_apart(topology: Trimesh) -> tuple[str, ...]:
 def name_parts(
     topology: Trimesh, surface: Surface, patches: tuple[SurfacePatch, ...], angle: float
 ) -> BodyMesh:
-    """Return the surface with names: those that the file gives to parts of it, and of the rest by sharp edges.
+    """Return the surface, without tetrahedra, with names: those that the file gives to its parts, then by sharp edges.
 
-    Returns
-    -------
-    BodyMesh
-        Without tetrahedra. Names are the file's, then ``face 1``, ``face 2``, … by falling area.
+    Names are the file's, then ``face 1``, ``face 2``, … by falling area.
     """
     part = segments(topology, angle)
     rest = np.ones(len(part), dtype=bool)

@@ -89,14 +89,7 @@ def read_gmsh(path: str) -> MeshSource:
     """Read a mesh of Gmsh in format 4.1, as text or binary, or in format 4.0 as text.
 
     An entity may belong to several physical groups, or to none. Where there is no physical group of a dimension,
-    the geometry's own entities are groups by their numbers.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is cut short or damaged.
-    UsageError
-        If it is one part of a partitioned mesh.
+    the geometry's own entities are groups by their numbers. One part of a partitioned mesh is refused.
     """
     content = read_part(path)
     if b"$PartitionedEntities" in content:

@@ -26,13 +26,7 @@ PAIRS = 500_000  # pairs of triangles that are compared at a time
 
 
 def require_closed(surface: Trimesh, source: str) -> None:
-    """Refuse a surface that bounds no body: empty, open, not a manifold, facing inwards or cutting itself.
-
-    Raises
-    ------
-    UsageError
-        Naming the fault, how many edges have it and where.
-    """
+    """Refuse a surface that bounds no body: empty, open, not a manifold, facing inwards or cutting itself."""
     if not len(surface.faces):
         raise UsageError(
             f"{source} holds no triangles.",
@@ -133,21 +127,11 @@ def _neighbours(corners: np.ndarray, slack: float) -> Iterator[tuple[np.ndarray,
 
 @dataclass(frozen=True, eq=False)
 class Shells:
-    """The closed shells of a surface.
+    """The closed shells of a surface."""
 
-    Attributes
-    ----------
-    shell_of : (t,) int array
-        Number of each triangle's shell, from 0.
-    volumes : (s,) array
-        Volume that each encloses, m³; negative where its triangles face inwards, as those of a cavity do.
-    inside : tuple of tuple of int
-        For each shell those that contain it.
-    """
-
-    shell_of: np.ndarray
-    volumes: np.ndarray
-    inside: tuple[tuple[int, ...], ...]
+    shell_of: np.ndarray  # (t,) number of each triangle's shell, from 0
+    volumes: np.ndarray  # (s,) m³; negative where triangles face inwards, as those of a cavity do
+    inside: tuple[tuple[int, ...], ...]  # for each shell those that contain it
 
 
 def shells_of(surface: Trimesh) -> Shells:

@@ -20,6 +20,7 @@ from palpate.devices.openhaptics import OpenHapticsDevice, OpenHapticsSettings
 from palpate.runtime import Workspace
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Limits
+from waiting import wait_for
 
 TICK = 1e-3
 
@@ -148,10 +149,23 @@ class HaplyRig(Rig):
         usual = {"events": float(self.service.events_port), "wait": 1.0, "search": 0.0}
         device = HaplyDevice(HaplySettings(url=f"ws://127.0.0.1:{self.service.port}", **(usual | settings)))
         if device._events is not None:
-            device._events._clock = (
-                Clock()
-            )  # its budget of time never ends: the machine may have much else to do
+            # its budget of time never ends: the machine may have much else to do
+            device._events._clock = Clock()
+        self.sent = self.service.received  # all of them were answered
+        send = device._channel.send
+
+        def count(text):
+            send(text)
+            self.sent += 1
+
+        device._channel.send = count
         return device
+
+    def arrive(self):
+        clients = self.service._clients
+        wait_for(
+            lambda: self.service.received >= self.sent or {"simulation"} not in clients.values(), pause=0.0
+        )
 
     def close(self):
         self.device.close()
@@ -260,7 +274,7 @@ class CrtkRig(Rig):
         self.service.step()
 
     def arrive(self):
-        if self.device.published and not self.device.closed and self.service._subscribed:
+        if self.device.published and not self.device.closed and self.service._clients:
             assert self.service.await_wrenches(self.device.published)
 
     def force(self):

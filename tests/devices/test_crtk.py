@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import select
-import time
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +20,7 @@ from palpate.errors import DeviceError, DeviceLostError, PortInUseError, UsageEr
 from palpate.runtime import Fault, Workspace
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Limits
+from waiting import wait_for
 
 FRAMES = json.loads((Path(__file__).parents[1] / "data/devices/crtk.json").read_text(encoding="utf-8"))
 pytestmark = pytest.mark.timeout(240)
@@ -124,20 +124,13 @@ def test_what_is_sent_has_the_fields_and_types_of_the_example_messages(ros):
         rig.drive(2, (0.0, 0.0, 1.0))
         device.close()
         assert service.await_wrenches(device.published)
-        wait_until(lambda: "/MTMR/unlock_orientation" in service.received)
+        wait_for(lambda: "/MTMR/unlock_orientation" in service.received)
         for frame in (f for f in FRAMES["to_the_arm"] if f["ros"] == ros):
             sent, known = shape(service.received[frame["topic"]]), shape(frame["msg"])
             header, full = sent.pop("header", {}), known.pop("header", {})
             assert sent == known, frame["topic"]
             assert header.items() <= full.items(), "the bridge fills in what is left out of a header"
             assert types[frame["topic"]] == frame["type"]
-
-
-def wait_until(done):
-    deadline = time.monotonic() + 10.0
-    while not done():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
 
 
 @pytest.mark.parametrize("ros", [1, 2])
@@ -152,8 +145,7 @@ def test_the_double_writes_what_the_example_messages_have(ros):
             channel.send(json.dumps({"op": "subscribe", "topic": frame["topic"], "type": frame["type"]}))
         for pedal in {f["topic"] for f in frames if f["type"].endswith("Joy")}:
             service.press(pedal, 1)
-        deadline = time.monotonic() + 10.0
-        while len(told) < len({f["topic"] for f in frames}) and time.monotonic() < deadline:
+        while len(told) < len({f["topic"] for f in frames}):
             for text in channel.receive(0.1):
                 message = json.loads(text)
                 assert message["op"] == "publish", message
@@ -165,13 +157,13 @@ def test_the_double_writes_what_the_example_messages_have(ros):
 def test_a_limp_arm_bears_its_weight_and_holds_its_wrist(service, device, rig):
     """As the maker's own example begins: gravity compensation, the base's axes, no force, and the wrist as it is."""
     assert (service.gravity, service.absolute, service.limp) == (True, True, True)
-    wait_until(lambda: device.locked or rig.drive(1) is None)
+    wait_for(lambda: device.locked or rig.drive(1) is None)
     assert service.locked == pytest.approx({"x": 0.0, "y": 0.0, "z": math.sqrt(0.5), "w": math.sqrt(0.5)})
     assert device.note == ""
     rig.drive(3, (1.0, 2.0, 3.0))
     np.testing.assert_array_equal(service.force(), [1.0, 2.0, 3.0])
     device.close()
-    wait_until(lambda: service.locked is None)
+    wait_for(lambda: service.locked is None)
     assert service.gravity, "an arm that is let go must not fall"
 
 
@@ -192,14 +184,14 @@ def test_an_arm_that_was_restarted_is_asked_for_all_again(rig, loop):
     service.absolute, service.gravity = False, False
     service.state = "ENABLED"
     assert rig.run(30)[-1][1] is Fault.NONE
-    wait_until(lambda: service.locked is not None)
+    wait_for(lambda: service.locked is not None)
     assert (service.absolute, service.gravity, service.limp) == (True, True, True)
 
 
 def test_a_wrist_that_swings_again_is_told(service, device, rig):
     rig.drive(2)
     service.publish("/arm/orientation_locked", {"data": False})
-    wait_until(lambda: device.locked is False or rig.drive(1) is None)
+    wait_for(lambda: device.locked is False or rig.drive(1) is None)
     assert device.note == "its wrist does not hold its orientation"
 
 
@@ -211,7 +203,7 @@ def test_an_arm_that_could_not_be_opened_was_not_made_limp(service, rig):
     service.state, service.faults.runaway = "ENABLED", 0.01
     with pytest.raises(DeviceError, match="Hold it still"):
         rig.open()
-    wait_until(lambda: "/arm/unlock_orientation" in service.received)
+    wait_for(lambda: "/arm/unlock_orientation" in service.received)
     assert service.locked is None, "the wrist is free again"
 
 
@@ -235,7 +227,7 @@ def test_pedals_clutch_stop_and_are_dead_man(service, rig):
         assert pedal_sample(rig, f"footpedals/{pedal}", 0).buttons == 1
     assert pedal_sample(rig, "footpedals/coag", 2).buttons == 0, "a tap holds nothing"
     service.press("footpedals/camera", 2)
-    wait_until(lambda: rig.drive(1) and device.sample.buttons == 0b100)
+    wait_for(lambda: rig.drive(1) and device.sample.buttons == 0b100)
     rig.drive(1)
     assert device.sample.buttons == 0, "a tap is one sample long: it stops, and a person resumes"
     device.close()
@@ -350,11 +342,11 @@ def test_the_delay_softens_a_body(plain, shared):
 
 
 def test_the_round_trip_is_measured(monkeypatch):
-    monkeypatch.setattr(crtk, "LONGEST_DELAY", 1.0)  # the machine may have much else to do
+    monkeypatch.setattr(crtk, "LONGEST_DELAY", 60.0)  # the machine may have much else to do
     with CrtkRig(rate=200.0) as rig:
         service = rig.service
         device = rig.open(delay=-1.0)
-        assert 0.0 < device.round_trip < 1.0
+        assert 0.0 < device.round_trip < 60.0
         assert device.traits.delay == 0.5 * device.round_trip
         device.close()
         service.faults.deaf = True
@@ -454,6 +446,7 @@ def test_a_closed_bridge_is_a_fault_with_its_reason_and_found_again(rig, service
     assert "ROS bridge" in loop.device_error
     rig.device.close()
     rig.connect().close()  # nothing is left that a new start doesn't heal
+    wait_for(lambda: not service._clients)  # the last words of those before have been heard
     service.faults.closing = True
     with pytest.raises(DeviceLostError, match="closed the connection"):
         rig.open()

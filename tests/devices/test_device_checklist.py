@@ -21,7 +21,7 @@ from rigs import RIGS, PlainRig, rig_of
 from spnav_double import Daemon
 
 from palpate import devices
-from palpate.devices import Sample, device_named, device_names, device_traits
+from palpate.devices import Sample, device_named, device_names, device_traits, spacemouse
 from palpate.devices.device_search import HARDWARE
 from palpate.devices.stroke import StrokeDevice
 from palpate.devices.tick_record import FLAGS
@@ -83,6 +83,7 @@ def rig(name, request, shared, double):
                     sys.modules, "evdev", evdev_double.module(Pad())
                 )
             elif name == "spacemouse":
+                request.getfixturevalue("monkeypatch").setattr(spacemouse, "_ANSWER", 60.0)
                 address = f"spacemouse:socket={stack.enter_context(Daemon()).path}"
             elif name == "trace":
                 address = f"trace:file={request.getfixturevalue('recorded_stroke')},repeat=1"

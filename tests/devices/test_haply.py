@@ -6,7 +6,6 @@ import contextlib
 import http.client
 import json
 import math
-import time
 
 import numpy as np
 import pytest
@@ -17,7 +16,8 @@ from palpate.devices.haply import HaplyDevice, HaplySettings
 from palpate.devices.profiles import device_profile, weakest_profile
 from palpate.devices.websocket_channel import WebsocketChannel
 from palpate.errors import DeviceError, PortInUseError, UsageError
-from palpate.runtime import Fault, LoopProcess, now
+from palpate.runtime import Fault, LoopProcess
+from waiting import wait_for
 
 pytestmark = pytest.mark.timeout(240)
 OPENING = 50  # messages
@@ -142,9 +142,7 @@ def test_lost_and_doubled_answers_are_counted_and_survived(service, device, rig)
     rig.drive(5)
     service.faults.doubled = 3
     rig.drive(20)
-    until = now() + 20.0
-    while device.surplus < 3 and now() < until:
-        device.read(rig.clock.time)
+    wait_for(lambda: device.read(rig.clock.time) and device.surplus >= 3)
     assert device.surplus == 3
     service.faults.dropped, device.wait = 2, 0.02
     rig.drive(40)
@@ -486,11 +484,7 @@ def test_the_real_loop_on_the_double(spring_file):
     with HaplySimulator(SimulatorSettings(port=0, events=0, frequency=2.0, kind="inverse4")) as service:
         device = f"haply:ws://127.0.0.1:{service.port},events={service.events_port}"
         with LoopProcess(spring_file, device=device) as loop:
-            until, force = now() + 20.0, 0.0
-            while now() < until and force < 0.2:
-                time.sleep(0.01)
-                force = loop.read().force[1]
+            wait_for(lambda: loop.read().force[1] >= 0.2)  # the hand goes down and is pushed up
             assert "unknown type" in loop.read().device
             assert "least of each limit" in loop.report().device_note, "while it runs"
-    assert force >= 0.2, "the hand goes down and is pushed up"
     assert loop.report().foreign == ()

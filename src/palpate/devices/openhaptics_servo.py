@@ -113,31 +113,25 @@ class Mailbox:
         return self.cells[EARLY:].reshape(FIRST, 6)
 
 
-def _call(context: Any, builder: Any, result: Any, address: Any, arguments: list[Any]) -> Any:
-    kind = ir.FunctionType(result, [argument.type for argument in arguments])
-    return builder.call(builder.inttoptr(address, kind.as_pointer()), arguments)
+def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    """Call what lies at the address that is the first argument, with the others."""
+    returns = signature.return_type != types.void
+    result = ir.IntType(64) if returns else ir.VoidType()
+    kind = ir.FunctionType(result, [argument.type for argument in args[1:]])
+    value = builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
+    return value if returns else context.get_dummy_value()
 
 
 @_extension
 def _frame(typingctx: Any, address: Any, device: Any) -> Any:
     """Call ``void f(unsigned int)`` at an address."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        _call(context, builder, ir.VoidType(), args[0], [args[1]])
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.uint32), generate
+    return types.void(types.int64, types.uint32), _call
 
 
 @_extension
 def _transfer(typingctx: Any, address: Any, code: Any, place: Any) -> Any:
     """Call ``void f(unsigned int, void *)`` at an address."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        _call(context, builder, ir.VoidType(), args[0], [args[1], args[2]])
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.uint32, types.int64), generate
+    return types.void(types.int64, types.uint32, types.int64), _call
 
 
 @_extension
@@ -147,22 +141,13 @@ def _returned(typingctx: Any, address: Any) -> Any:
     A structure of twelve bytes comes back in two registers (System V and Arm calling conventions); the first holds
     the first two of its three numbers.
     """
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _call(context, builder, ir.IntType(64), args[0], [])
-
-    return types.uint64(types.int64), generate
+    return types.uint64(types.int64), _call
 
 
 @_extension
 def _hidden(typingctx: Any, address: Any, place: Any) -> Any:
     """Call a function that writes what it returns to a place (64-bit Windows)."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        _call(context, builder, ir.VoidType(), args[0], [args[1]])
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.int64), generate
+    return types.void(types.int64, types.int64), _call
 
 
 @functools.cache

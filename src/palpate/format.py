@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from palpate.units import Range
 
@@ -15,7 +14,6 @@ __all__ = [
     "count",
     "criterion_figure",
     "duration",
-    "finite",
     "interval",
     "length",
     "millimetres",
@@ -46,15 +44,6 @@ def plain(value: float, digits: int = 2) -> str:
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
     text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
-
-
-def finite(value: Any) -> Any:
-    """Return plain data whose numbers JSON can say: those that are not finite become None."""
-    if isinstance(value, Mapping):
-        return {str(k): finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def script_json(text: str) -> str:

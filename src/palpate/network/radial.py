@@ -21,7 +21,7 @@ Rows of `work`, of which the first h columns are used, with `steps` the same mem
 from __future__ import annotations
 
 import math
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -44,17 +44,20 @@ RadialFunction = Literal["gaussian", "inverse-multiquadric", "matern-5/2"]
 RADIAL_FUNCTIONS: tuple[RadialFunction, ...] = get_args(RadialFunction)
 
 
-def radial(name: RadialFunction, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """g, dg/dq and d²g/dq² at squared distances q ≥ 0 of any shape; all finite at q = 0."""
+def radial(name: RadialFunction, q: Any, exp: Any = np.exp, sqrt: Any = np.sqrt) -> tuple[Any, Any, Any]:
+    """g, dg/dq and d²g/dq² at squared distances q ≥ 0 of any shape; all finite at q = 0.
+
+    Arrays, or values of a graph with its own `exp` and `sqrt`.
+    """
     if name == "gaussian":
-        g = np.exp(-q)
+        g = exp(-q)
         return g, -g, g
     if name == "inverse-multiquadric":
         u = 1.0 / (1.0 + q)
-        g = np.sqrt(u)
+        g = sqrt(u)
         return g, -0.5 * g * u, 0.75 * g * u * u
-    s = np.sqrt(5.0 * q)
-    e = np.exp(-s)
+    s = sqrt(5.0 * q)
+    e = exp(-s)
     return (1.0 + s + s * s / 3.0) * e, (-5.0 / 6.0) * (1.0 + s) * e, (25.0 / 12.0) * e
 
 

@@ -90,6 +90,10 @@ class ContactBaseline(Baseline):
         """The touched surface at rest."""
         return self.touched
 
+    def with_surface(self, surface: TouchedSurface) -> ContactBaseline:
+        """Return the same contact on another surface."""
+        return replace(self, touched=surface)
+
     @property
     def radius(self) -> float:
         """Radius of the probe, m; not-a-number where an input is it."""

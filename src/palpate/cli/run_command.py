@@ -18,6 +18,7 @@ from palpate.runtime import LoopProcess
 from palpate.runtime.devices import device_traits
 from palpate.runtime.shared_state import State
 from palpate.runtime.touchable import Touchable, load_touchable
+from palpate.runtime.warm_up import WarmUp
 from palpate.surrogates.surrogate import correction_warning
 
 __all__ = ["aim_device", "run_loop"]
@@ -111,10 +112,15 @@ def run_loop(
     ResourceError
         If the recording stopped by itself; the loop has run on, and its report is printed.
     """
-    touch = load_touchable(model)
-    settings = touch.meta.get("runtime", {})
-    rate = rate or settings.get("rate", 1000.0)
-    device = aim_device(device, touch)
+    # the loop's kernels are compiled beside the body's
+    with WarmUp("loop") as warm_up:
+        touch = load_touchable(model)
+        settings = touch.meta.get("runtime", {})
+        rate = rate or settings.get("rate", 1000.0)
+        if warm_up.words:
+            console.say(f"{warm_up.words} …")
+        device = aim_device(device, touch)
+        warm_up.wait()
     if warning := correction_warning(touch.meta):
         console.say(f"its correction was warned of: {warning}")
     limit = settings.get("max_force")

@@ -446,12 +446,18 @@ def _serve(
 ) -> None:
     from palpate.cli.run_command import aim_device
     from palpate.runtime.touchable import load_touchable
+    from palpate.runtime.warm_up import WarmUp
 
-    Console().say(f"Opening the page of {model} …")  # the loop's own process takes some seconds to start
-    from palpate.viewer import serve
+    with WarmUp("loop") as warm_up:
+        words = f": {warm_up.words}" if warm_up.words else ""
+        # the loop's own process takes some seconds to start
+        Console().say(f"Opening the page of {model} …{words}")
+        from palpate.viewer import serve
 
-    body = load_touchable(model)
-    settings = body.meta.get("runtime", {})
+        body = load_touchable(model)
+        settings = body.meta.get("runtime", {})
+        device = aim_device(device, body)
+        warm_up.wait()
     serve(
         model,
         port=settings.get("port", 8080) if port is None else port,
@@ -460,7 +466,7 @@ def _serve(
         open_browser=browser and sys.stdout.isatty(),
         strict_port=strict_port,
         token=token,
-        device=aim_device(device, body),
+        device=device,
         unsoftened=unsoftened,
         controller=controller,
         dead_man=dead_man,

@@ -16,5 +16,6 @@ touching_cost  time and memory of one Newton iteration over the number of unknow
 plain_touch the plain NGSolve script, and how long its load steps may be
 cases       the solves that all of them learn from     rivals   interpolation and regression by others
 table       a table as a value                         machine  where the figures come from
-runner      options, printing, and the blocks of docs/benchmarks.md
+records     tables of record, and the blocks of the documentation
+runner      options and printing
 """

@@ -1,6 +1,6 @@
 """Solves needed to reach a force error, by how they were chosen: active choice beside Sobol and other designs.
 
-python -m benchmarks --only active_choice [--quick] [--json | --markdown] [--into FILE]
+python -m benchmarks --only active_choice [--quick] [--json] [--record]
 
 A pool is the training solves of a benchmark's file, about 300; its test solves judge. All rules begin with the same
 twelve points of a scrambled Sobol sequence, a new one for each seed, and go on in batches of eight. First a Gaussian

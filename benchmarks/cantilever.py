@@ -1,6 +1,6 @@
 """The founding study's cantilevers: the filter's forms, the refined network, and batch rivals.
 
-python -m benchmarks.cantilever [--quick] [--json | --markdown]
+python -m benchmarks.cantilever [--quick] [--json]
 """
 
 from __future__ import annotations

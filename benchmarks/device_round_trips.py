@@ -1,6 +1,6 @@
 """Round trips a second of the loop with a simulated Haply service, in lock step: one answer for each command.
 
-python -m benchmarks.device_round_trips [--quick] [--json | --markdown]
+python -m benchmarks.device_round_trips [--quick] [--json]
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from typing import Any
 from benchmarks.cases import touch_model
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
+from palpate.devices.doubles.haply_simulator import HaplySimulator, SimulatorSettings
 from palpate.runtime import LoopProcess
-from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
 
 __all__ = ["tables"]
 

@@ -1,6 +1,6 @@
 """Time of an exported body beside palpate's own compiled evaluator, in the same run.
 
-    python -m benchmarks.export_speed [--quick] [--json | --markdown]
+    python -m benchmarks.export_speed [--quick] [--json]
 
 Force and stiffness of a flat body of 320 units at 20,000 places in contact: the exported C, compiled by gcc and by
 clang with -O3 -march=native as Numba compiles for this machine, and with -O2 for any; and a tick of an organ with a

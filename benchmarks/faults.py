@@ -1,6 +1,6 @@
 """A thousand faults of every kind in the midst of a touch: how soon there is no force, and how it comes back.
 
-python -m benchmarks.faults [--quick] [--json | --markdown]
+python -m benchmarks.faults [--quick] [--json]
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cases import formula_block, formula_pad
+from benchmarks.fault_injection import FAULTS, FaultInjector, Outcome
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table
+from palpate.devices.doubles.haply_simulator import HaplySimulator, SimulatorSettings
 from palpate.errors import DeviceError
 from palpate.runtime import LoopProcess
-from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
-from palpate.runtime.fault_injection import FAULTS, FaultInjector, Outcome
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.memories import Relaxation
 

@@ -1,6 +1,6 @@
 """Errors and intervals that `palpate.fit` states of 25, 40 and 80 clean rows, beside a Gaussian process.
 
-python -m benchmarks --only few_rows [--quick] [--json | --markdown] [--into FILE]
+python -m benchmarks --only few_rows [--quick] [--json] [--record]
 
 Needs scikit-learn. Some minutes on one core.
 """

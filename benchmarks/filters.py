@@ -1,6 +1,6 @@
 """What one observation costs each rule, in time and memory, beside the textbook and beside bare BLAS.
 
-    python -m benchmarks.filters [--quick] [--json | --markdown] [--picture FILE]
+    python -m benchmarks.filters [--quick] [--json] [--picture FILE]
 
 Contenders take turns within a round and are timed by their own CPU time; ratios are taken within a round.
 """

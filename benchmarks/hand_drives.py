@@ -1,6 +1,6 @@
 """A simulated hand on every device's profile, on four bodies: energy, force, rest; beside the loop without its control.
 
-    python -m benchmarks.hand_drives [--quick] [--json | --markdown]
+    python -m benchmarks.hand_drives [--quick] [--json]
 
 Each run is the loop as it is, from the encoder to the force sent, for a minute of its own time, computed as fast as it
 goes. The hand moves at random, or so as to shake, or goes after a recorded hand; then it presses and stays. The rival
@@ -25,14 +25,14 @@ from benchmarks.runner import main
 from benchmarks.surrogate_cases import Case
 from benchmarks.surrogate_measure import learnt
 from benchmarks.table import Claim, Column, Table
-from palpate.runtime.devices.profiles import PROFILES, DeviceProfile
-from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
+from palpate.devices.profiles import PROFILES, DeviceProfile
+from palpate.devices.simulated import SimulatedHand, SimulatedSettings
+from palpate.devices.trace_file import TraceWriter
 from palpate.runtime.loop import Loop
 from palpate.runtime.recording import Ring, TickRecorder
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.touchable import Touchable, touchable
-from palpate.runtime.trace_file import TraceWriter
 from palpate.surrogates import Surrogate
 
 __all__ = ["Drive", "tables"]

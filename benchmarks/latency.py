@@ -1,6 +1,6 @@
 """One query at a time, interleaved with rivals in the same process.
 
-    python -m benchmarks.latency [--quick] [--json | --markdown]
+    python -m benchmarks.latency [--quick] [--json]
 
 Every round times a block of calls of each contender, one after the other, so that whatever else the machine does
 falls on all of them; figures are medians over the rounds, and ratios are taken within a round.

@@ -1,6 +1,6 @@
 """Learning a stream with bounded refinement beside refining all of it at once, with as many units.
 
-python -m benchmarks.online [--quick] [--json | --markdown]
+python -m benchmarks.online [--quick] [--json]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Size, opening and time of a picture of a body as one HTML file, in Chromium and from disk.
 
-    python -m benchmarks.page_speed [--quick] [--json | --markdown]
+    python -m benchmarks.page_speed [--quick] [--json]
 
 An organ of 20,000 vertices with 16 modes: an ellipsoid with a waist, an uneven mesh, a curved touched surface, 320
 units, and modes of made-up dents by proper orthogonal decomposition. The page is opened from disk without a network,

@@ -1,6 +1,6 @@
 """The automatic choice of a network beside other surrogates, on five maps given by formula.
 
-    python -m benchmarks.peers [--quick] [--json | --markdown]
+    python -m benchmarks.peers [--quick] [--json]
 
 Everyone learns the same samples in this process on one thread, and is asked the same question in turn. Fit seconds
 include all tuning.

@@ -1,6 +1,6 @@
 """How punctual the loop is, beside ``cyclictest`` (rt-tests) at the same priority, while a page and a learner work.
 
-    python -m benchmarks.punctuality [--quick] [--json | --markdown]
+    python -m benchmarks.punctuality [--quick] [--json]
 
 The second table is of one loop while a page drags: at rest, while a part is solved and learnt as `palpate touch` does,
 and while, besides, another surrogate takes the place of the one in the hand, every two seconds.

@@ -1,6 +1,6 @@
 """What refinement reaches in how much time, and what the trained region costs per query.
 
-python -m benchmarks.refinement [--quick] [--json | --markdown]
+python -m benchmarks.refinement [--quick] [--json]
 """
 
 from __future__ import annotations

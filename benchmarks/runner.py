@@ -1,11 +1,10 @@
-"""Options, printing, and the blocks of docs/benchmarks.md."""
+"""Options and printing of the benchmarks, and their tables of record."""
 
 from __future__ import annotations
 
 import argparse
 import importlib
 import json
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from benchmarks.machine import machine_line, machine_record
+from benchmarks.records import RECORDS, Record, renew
 from benchmarks.table import Table
 
 __all__ = ["BENCHMARKS", "Benchmark", "main"]
@@ -81,27 +81,33 @@ def main(arguments: Sequence[str] | None = None, *, only: str | None = None) -> 
             studies = {"studies": options.study} if name == "surrogates" and options.study else {}
             found = importlib.import_module(f"benchmarks.{name}").tables(quick=options.quick, **studies)
             tables += found
-            if not (options.json or options.markdown):
+            if not options.json:
                 for table in found:
                     table.show(console)
     if options.json:
         print(json.dumps({"machine": machine_record(), "tables": [t.plain() for t in tables]}, indent=2))
-    elif options.markdown:
-        print("\n\n".join(_block(table) for table in tables))
     else:
         console.print(machine_line(), highlight=False, soft_wrap=True)
-    if options.into:
-        _replace(options.into, tables)
+    if options.record:
+        for table in tables:
+            Record.of(table).write(table.name, options.record)
+        if options.record == RECORDS:
+            renew()
     return 0
 
 
 def _parser(only: str | None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog=f"python -m benchmarks{f'.{only}' if only else ''}")
     parser.add_argument("--quick", action="store_true", help="few seeds and repetitions: is it able to run?")
-    shape = parser.add_mutually_exclusive_group()
-    shape.add_argument("--json", action="store_true", help="numbers for machines")
-    shape.add_argument("--markdown", action="store_true", help="the blocks of docs/benchmarks.md")
-    parser.add_argument("--into", type=Path, metavar="FILE", help="replace the blocks in this Markdown file")
+    parser.add_argument("--json", action="store_true", help="numbers for machines")
+    parser.add_argument(
+        "--record",
+        nargs="?",
+        type=Path,
+        const=RECORDS,
+        metavar="FOLDER",
+        help="write the tables of record, by default those of the project, and renew the documentation's blocks",
+    )
     if only in {None, "surrogates"}:
         parser.add_argument(
             "--study",
@@ -114,26 +120,3 @@ def _parser(only: str | None) -> argparse.ArgumentParser:
     if only is None:
         parser.add_argument("--only", nargs="+", choices=BENCHMARKS, help="some of them")
     return parser
-
-
-def _block(table: Table) -> str:
-    return f"{_begin(table)}\n{table.markdown()}\n\n*{machine_line()}*\n{_end(table)}"
-
-
-def _begin(table: Table) -> str:
-    return f"<!-- benchmark {table.name}: begin -->"
-
-
-def _end(table: Table) -> str:
-    return f"<!-- benchmark {table.name}: end -->"
-
-
-def _replace(path: Path, tables: Sequence[Table]) -> None:
-    text = path.read_text(encoding="utf-8")
-    for table in tables:
-        pattern = re.compile(re.escape(_begin(table)) + ".*?" + re.escape(_end(table)), re.DOTALL)
-        if not pattern.search(text):
-            print(f"{path} has no block for {table.name}", file=sys.stderr)
-        block = _block(table)
-        text = pattern.sub(lambda _, block=block: block, text)
-    path.write_text(text, encoding="utf-8")

@@ -1,6 +1,6 @@
 """The 1 kHz loop in its own process: moved by a scripted hand, and at rest where nobody touches.
 
-python -m benchmarks.runtime [--quick] [--json | --markdown]
+python -m benchmarks.runtime [--quick] [--json]
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Any
 from benchmarks.cases import BEAMS, formula_block, touch_model
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table, quick_mark
+from palpate.devices.doubles.haply_simulator import HaplySimulator, SimulatorSettings
 from palpate.runtime import LoopProcess, LoopReport
-from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
 from palpate.runtime.loop_report import percentile
 from palpate.runtime.shared_state import now
 

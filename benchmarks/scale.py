@@ -1,6 +1,6 @@
 """Fits to many rows beside a perceptron and boosted trees: errors, times and memory, each in a process of its own.
 
-python -m benchmarks.scale [--quick] [--json | --markdown]
+python -m benchmarks.scale [--quick] [--json]
 """
 
 from __future__ import annotations

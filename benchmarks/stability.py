@@ -1,6 +1,6 @@
 """Does the pure filter regress? Both cantilevers, many orders of presentation, thresholds over two decades.
 
-python -m benchmarks.stability [--quick] [--json | --markdown]
+python -m benchmarks.stability [--quick] [--json]
 """
 
 from __future__ import annotations

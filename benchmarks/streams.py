@@ -1,6 +1,6 @@
 """Streams that drift, jump, have outliers or uneven noise: a learner as it comes beside recursive rivals.
 
-python -m benchmarks.streams [--quick] [--json | --markdown]
+python -m benchmarks.streams [--quick] [--json]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Surrogates of touched bodies: error against the number of solves, beside every rival; what a hand feels; time.
 
-python -m benchmarks --only surrogates [--study block layered query] [--quick] [--json | --markdown] [--into FILE]
+python -m benchmarks --only surrogates [--study block layered query] [--quick] [--json] [--record]
 python -m benchmarks.surrogate_plots figures.json docs/images      the curves, from what --json wrote
 
 Data come from ``benchmarks/data``, made by `benchmarks.touch_data`; a study without a file is left out.

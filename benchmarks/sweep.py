@@ -1,6 +1,6 @@
 """Solves per second: what warm starts and workers buy, and what starting the workers costs.
 
-python -m benchmarks.sweep [--quick] [--json | --markdown]
+python -m benchmarks.sweep [--quick] [--json]
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A table of results as a value, and its three shapes: terminal, Markdown, JSON."""
+"""A table of results as a value, printed on a terminal or as plain data."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Table:
     Attributes
     ----------
     name : str
-        Of the block in docs/benchmarks.md.
+        Of its record in benchmarks/records.
     title : str
     columns : sequence of Column
     rows : sequence of mappings
@@ -115,18 +115,6 @@ class Table:
         console.print(table)
         for line in (*map(str, self.claims), *self.notes):
             console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
-
-    def markdown(self) -> str:
-        """Print as Markdown."""
-        lines = [
-            f"**{self.title}**",
-            "",
-            "| " + " | ".join(c.title for c in self.columns) + " |",
-            "|" + "|".join(["---"] + ["--:"] * (len(self.columns) - 1)) + "|",
-            *("| " + " | ".join(c.text(row) for c in self.columns) + " |" for row in self.rows),
-        ]
-        extra = [f"- {line}" for line in (*map(str, self.claims), *self.notes)]
-        return "\n".join([*lines, "", *extra]) if extra else "\n".join(lines)
 
     def plain(self) -> dict[str, Any]:
         """Plain data for JSON, numbers unrounded."""

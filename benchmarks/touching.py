@@ -1,6 +1,6 @@
 """A sphere on a block of soft tissue: a sweep in columns beside a plain NGSolve script.
 
-python -m benchmarks.touching [--quick] [--json | --markdown]
+python -m benchmarks.touching [--quick] [--json]
 
 What the mesh does to the force is measured by `benchmarks.touching_mesh`, what pads and springs do to it by
 `benchmarks.touching_feel`, time and memory over the number of unknowns by `benchmarks.touching_cost`.

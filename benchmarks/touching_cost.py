@@ -1,6 +1,6 @@
 """Time and memory of a solve over the number of unknowns.
 
-python -m benchmarks.touching_cost [--quick] [--json | --markdown]
+python -m benchmarks.touching_cost [--quick] [--json]
 """
 
 from __future__ import annotations

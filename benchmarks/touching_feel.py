@@ -1,6 +1,6 @@
 """What else is felt: the pad in series with the body, and what springs make of the same body.
 
-python -m benchmarks.touching_feel [--quick] [--json | --markdown]
+python -m benchmarks.touching_feel [--quick] [--json]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What the mesh does to the force of a touch: its imprint while the sphere slides, and convergence over its size.
 
-python -m benchmarks.touching_mesh [--quick] [--json | --markdown]
+python -m benchmarks.touching_mesh [--quick] [--json]
 """
 
 from __future__ import annotations

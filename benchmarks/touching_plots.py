@@ -1,4 +1,4 @@
-"""The pictures of docs/benchmarks.md that belong to touching, from what the benchmarks wrote as JSON.
+"""The pictures of docs/benchmarks/solves.md that belong to touching, from what the benchmarks wrote as JSON.
 
 python -m benchmarks --only touching_cost touching_mesh --json > figures.json
 python -m benchmarks.touching_plots figures.json docs/images

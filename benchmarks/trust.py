@@ -1,6 +1,6 @@
 """Errors and intervals that `palpate.fit` states, against new rows; its accuracy beside other surrogates.
 
-python -m benchmarks --only trust [--quick] [--json | --markdown] [--into FILE]
+python -m benchmarks --only trust [--quick] [--json] [--record]
 
 Rivals and tables are those of the packages that are installed; the extra ``bench`` has all.
 About half an hour on one core.

@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 
 from palpate.dataset.readers.mapping import read_mapping
+from palpate.devices.tick_record import TICK
+from palpate.devices.trace_file import TraceWriter, read_trace
 from palpate.errors import PalpateError
 from palpate.physics.shapes.mesh_source import read_source
 from palpate.physics.shapes.surface_file import parse_surface
-from palpate.runtime.recording import TICK
-from palpate.runtime.trace_file import TraceWriter, read_trace
 from palpate.study.toml import read_study
 
 FIELD = Path(__file__).parent / "data" / "field"

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from palpate import Dataset, load, read_results
 from palpate.dataset.measured import read_measurements
+from palpate.devices.trace_file import read_trace
 from palpate.errors import FileFormatError, PalpateError
 from palpate.input_files import LARGEST, open_input, plain_text, plain_texts, read_input, read_toml
-from palpate.runtime.trace_file import read_trace
 from palpate.study.toml import read_study
 from palpate.tables import read_table
 

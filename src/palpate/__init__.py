@@ -9,8 +9,19 @@
 The names below load when they are first used, so `import palpate` costs nothing.
 """
 
+from typing import Any
+
 import lazy_loader
 
-__version__ = "0.1.0"
+from palpate.page_hook import register_page
+from palpate.version import __version__ as __version__
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+@register_page
+def _page(body: Any) -> str:
+    """Return a body as one HTML page; it is loaded by the first body that is shown."""
+    from palpate.viewer.file_page import html_page
+
+    return html_page(body)

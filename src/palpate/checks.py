@@ -10,7 +10,8 @@
 and `own_arrays`, which makes the arrays of a frozen dataclass read-only.
 
 Import the module and name it in the call, ``checks.positive("The radius", radius, "m")``: the verbs alone are too
-common as names. `what` is the quantity's name as a sentence begins with it, with its article.
+common as names. `what` is the quantity's name as a sentence begins with it, with its article; `unit` is the SI unit
+that the message names, empty for a pure number.
 """
 
 from __future__ import annotations
@@ -30,22 +31,7 @@ __all__ = ["finite", "fits", "one_of", "own_arrays", "positive", "shape", "tripl
 
 
 def finite(what: str, value: Any, unit: str = "") -> float:
-    """Return a finite real number as a float.
-
-    Parameters
-    ----------
-    what : str
-        Name of the quantity, which begins the message.
-    value : number
-        Value to check; text such as ``"5 N"`` is refused.
-    unit : str
-        SI unit that the message names; empty for a pure number.
-
-    Raises
-    ------
-    UsageError
-        If the value is no real number, infinite or not-a-number.
-    """
+    """Return a finite real number as a float; text such as ``"5 N"`` is refused."""
     number = _real(what, value, unit)
     if math.isfinite(number):
         return number
@@ -57,24 +43,7 @@ def finite(what: str, value: Any, unit: str = "") -> float:
 
 
 def positive(what: str, value: Any, unit: str = "", *, infinite: bool = False) -> float:
-    """Return a positive real number as a float.
-
-    Parameters
-    ----------
-    what : str
-        Name of the quantity, which begins the message.
-    value : number
-        Value to check; text such as ``"5 N"`` is refused.
-    unit : str
-        SI unit that the message names; empty for a pure number.
-    infinite : bool
-        True where infinity is a sensible value.
-
-    Raises
-    ------
-    UsageError
-        If the value is no real number, not above zero or, unless `infinite`, not finite.
-    """
+    """Return a positive real number as a float; `infinite` where infinity is a sensible value."""
     number = _real(what, value, unit)
     if number > 0 and (infinite or math.isfinite(number)):
         return number
@@ -98,25 +67,8 @@ def fits(
 ) -> Any:
     """Return a finite number that lies between bounds, as a float or, where `whole`, as an int.
 
-    Parameters
-    ----------
-    what : str
-        Name of the quantity, which begins the message.
-    value : number
-        Value to check; text, and True and False where `whole`, are refused.
-    unit : str
-        SI unit that the message names; empty for a pure number.
-    least, most : float, optional
-        Bounds that the value may meet.
-    above, below : float, optional
-        Bounds that the value may not meet.
-    whole : bool
-        True for a count, an index or a seed.
-
-    Raises
-    ------
-    UsageError
-        If the value is no number, beyond a bound or, where `whole`, no whole number.
+    It may meet the bounds `least` and `most`, and may not meet `above` and `below`. `whole` is for a count, an index or
+    a seed, which True and False are not.
     """
     if whole and (isinstance(value, bool) or not isinstance(value, Integral)):
         inside = False
@@ -143,22 +95,7 @@ def fits(
 
 
 def one_of(what: str, value: Any, choices: Sequence[str]) -> str:
-    """Return a word that is among the choices.
-
-    Parameters
-    ----------
-    what : str
-        Name of the option, which begins the message.
-    value : str
-        Word to check.
-    choices : sequence of str
-        Words that are taken, spelt as they must be.
-
-    Raises
-    ------
-    UsageError
-        If the value is none of them; the message offers the nearest.
-    """
+    """Return a word that is among the choices, spelt as they are; otherwise the error's message offers the nearest."""
     if isinstance(value, str) and value in choices:
         return value
     near = difflib.get_close_matches(str(value).lower(), choices, n=1, cutoff=0.5)
@@ -178,27 +115,10 @@ def shape(
     why: str = "",
     infinite: bool = False,
 ) -> np.ndarray:
-    """Return an array of real numbers of a given shape, in double precision.
+    """Return an array of real numbers of a given shape, in double precision; one that is so already is not copied.
 
-    Parameters
-    ----------
-    what : str
-        Name of the array in the singular, which begins the message.
-    value : array-like
-        Array, list or tuple to check; arrays in double precision are returned as they are, not copied.
-    wanted : tuple of int or None
-        Length along each axis; None stands for any length above zero.
-    unit : str
-        SI unit that the message names; empty for pure numbers.
-    why : str
-        What rows and columns mean, one sentence for the message.
-    infinite : bool
-        True where infinities and not-a-number are let through.
-
-    Raises
-    ------
-    UsageError
-        If it holds anything but real numbers, has another shape or, unless `infinite`, is not finite.
+    `wanted` is the length along each axis, None for any above zero. `what` is the array's name in the singular, and
+    `why` a sentence for the message on what rows and columns mean. `infinite` lets infinities and not-a-number through.
     """
     import numpy as np  # the command line checks its options without arrays
 
@@ -235,18 +155,9 @@ def shape(
 
 
 def own_arrays(value: object, *names: str, dtype: Any = "float64") -> None:
-    """Replace arrays of a frozen dataclass by read-only, C-ordered copies.
+    """Replace arrays of a frozen dataclass, by their names, by read-only, C-ordered copies; None stays None.
 
     A ``__post_init__`` calls it, so that nobody can change the value from outside.
-
-    Parameters
-    ----------
-    value : object
-        The frozen dataclass, changed in place.
-    *names : str
-        Attributes to replace; one that is None stays None.
-    dtype : data type
-        Type of the numbers in the copies.
     """
     import numpy as np
 
@@ -259,22 +170,7 @@ def own_arrays(value: object, *names: str, dtype: Any = "float64") -> None:
 
 
 def triple(what: str, value: Any, unit: str = "") -> tuple[float, float, float]:
-    """Return three finite numbers along x, y and z as a tuple of floats.
-
-    Parameters
-    ----------
-    what : str
-        Name of the place, size or direction, which begins the message.
-    value : sequence of three numbers
-        Tuple, list or array to check.
-    unit : str
-        SI unit that the message names; empty for pure numbers.
-
-    Raises
-    ------
-    UsageError
-        If there are not three, or one of them is no finite real number.
-    """
+    """Return three finite numbers along x, y and z as a tuple of floats."""
     x, y, z = shape(what, value, (3,), unit, why="It needs three numbers, along x, y and z.").tolist()
     return x, y, z
 

@@ -39,12 +39,10 @@ __all__ = [
 ]
 
 _PREFIX, _LOCK = "palpate-", "in-use" if os.name != "nt" else "lock"
-_SYNCHRONISED_AT_ONCE = 16
-_MARK, _ABANDONED = (
-    "?" * 8,
-    3600.0,
-)  # pattern of the marks of unfinished files; s after which nobody writes them
-_HALF_DONE = 0.2  # s between two renames, at most
+_SYNCHRONISED_AT_ONCE = 16  # files: a disk takes many in little more than the time of one
+# pattern of the marks of unfinished files; s after which nobody writes them
+_MARK, _ABANDONED = "?" * 8, 3600.0
+_HALF_DONE = 0.2  # s between the two renames that replace a folder, at most
 _WRONG_PATH = {
     errno.ENOENT,
     errno.EEXIST,
@@ -60,15 +58,7 @@ _FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 @contextlib.contextmanager
 def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a path beside `path` for a file that takes its place when it is whole; else nothing changes.
-
-    Raises
-    ------
-    UsageError
-        If the path can't be a file's, for example because its folder is missing.
-    ResourceError
-        If the disk is full, the folder is write-protected, or the disk fails.
-    """
+    """Yield a path beside `path` for a file that takes its place when it is whole; else nothing changes."""
     target = Path(path)
     # its ending stays: it tells some writers the format
     part = target.with_name(f".{target.stem}.{uuid.uuid4().hex[:8]}.part{target.suffix}")
@@ -90,26 +80,14 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_file(path: str | os.PathLike[str], content: bytes | str) -> Path:
-    """Write a file of these bytes, or of this text in UTF-8, whole or not at all.
-
-    Raises
-    ------
-    UsageError, ResourceError
-        As for `writing`.
-    """
+    """Write a file of these bytes, or of this text in UTF-8, whole or not at all."""
     with writing(path) as part:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
     return Path(path)
 
 
 def require_regular(path: Path) -> None:
-    """Refuse to put a file in the place of a device, a pipe or a socket; what is no longer there is no fault.
-
-    Raises
-    ------
-    UsageError
-        If something other than a file or a folder has that name.
-    """
+    """Refuse to put a file in the place of a device, a pipe or a socket; what is no longer there is no fault."""
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise UsageError(
             f"{path} is a device, a pipe or a socket.",
@@ -123,11 +101,6 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a path beside `path` for a folder that takes its place when it is whole; else nothing changes.
 
     A folder that is there already is replaced.
-
-    Raises
-    ------
-    UsageError, ResourceError
-        As for `writing`.
     """
     target = Path(path)
     mark = uuid.uuid4().hex[:8]
@@ -140,9 +113,7 @@ def writing_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
             yield part
             from concurrent.futures import ThreadPoolExecutor
 
-            with ThreadPoolExecutor(
-                _SYNCHRONISED_AT_ONCE
-            ) as pool:  # a disk takes many in little more than the time of one
+            with ThreadPoolExecutor(_SYNCHRONISED_AT_ONCE) as pool:
                 list(pool.map(_synchronise, part.rglob("*")))
             if target.exists():
                 os.rename(target, old)
@@ -171,9 +142,8 @@ def restore_folder(path: str | os.PathLike[str]) -> None:
                 time.sleep(_HALF_DONE)  # its process may be about to bring the new one
             if not target.exists():
                 os.rename(old, target)
-            elif (
-                time.time() - old.stat().st_ctime > _ABANDONED
-            ):  # which a rename sets: a younger one may be in use
+            elif time.time() - old.stat().st_ctime > _ABANDONED:
+                # a rename sets that time: a younger folder may be in use
                 shutil.rmtree(old, ignore_errors=True)
 
 
@@ -201,15 +171,7 @@ def _synchronise(path: Path) -> None:
 
 @contextlib.contextmanager
 def system_errors(what: str) -> Iterator[None]:
-    """Turn errors of the operating system, and want of memory, into palpate's own; `what` happened, as a sentence.
-
-    Raises
-    ------
-    UsageError
-        If a path can't be one.
-    ResourceError
-        If the disk is full or write-protected, the memory is used up, or the like.
-    """
+    """Turn errors of the operating system, and want of memory, into palpate's own; `what` happened, as a sentence."""
     try:
         yield
     except PalpateError:

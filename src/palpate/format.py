@@ -137,12 +137,7 @@ def criterion_figure(value: float | tuple[float, float], kind: str) -> str:
 def summary_figure(name: str, value: object) -> object:
     """Write a figure of a model's own record by its name, as the table of limits writes it; others stay as they are.
 
-    Parameters
-    ----------
-    name : str
-        As `palpate.validation.Validation.summary` and the record of the learning give it.
-    value : object
-        Errors are written in per cent, errors over full scale as powers of ten.
+    Errors are written in per cent, errors over full scale as powers of ten.
     """
     if isinstance(value, bool) or not isinstance(value, float):
         return value
@@ -151,7 +146,7 @@ def summary_figure(name: str, value: object) -> object:
     return share(value) if name.startswith("force error") or name in _LEFT_OUT else value
 
 
-_LEFT_OUT = ("median", "p95")  # of the force errors on solves left out while learning
+_LEFT_OUT = ("median", "p95")  # statistics of the force errors on solves left out while learning
 
 
 def number(value: float, digits: int = 4) -> str:

@@ -74,19 +74,9 @@ Value = TypeVar("Value")
 
 
 def open_input(path: str | os.PathLike[str], *, largest: int = LARGEST) -> BinaryIO:
-    """Open a file for reading, in bytes.
+    """Open a file for reading, in bytes; links are followed.
 
-    Parameters
-    ----------
-    path : path
-        The file; links are followed.
-    largest : int
-        Number of bytes above which it is refused.
-
-    Raises
-    ------
-    FileFormatError
-        If it is missing, unreadable, larger than `largest`, or a folder, a pipe, a device or a socket.
+    A folder, a pipe, a device or a socket is refused, and a file of more than `largest` bytes.
     """
     try:
         _require_regular(path, os.stat(path), largest)  # before it is opened: some devices act on that
@@ -106,15 +96,7 @@ def open_input(path: str | os.PathLike[str], *, largest: int = LARGEST) -> Binar
 
 
 def read_input(path: str | os.PathLike[str], *, largest: int = LARGEST) -> bytes:
-    """Read a whole file.
-
-    Raises
-    ------
-    FileFormatError
-        As for `open_input`, or if the file grows while it is read.
-    ResourceError
-        If it is larger than the memory that is free.
-    """
+    """Read a whole file, as `open_input` opens it; one that grows meanwhile, or exceeds the free memory, is refused."""
     with open_input(path, largest=largest) as file:
         size = os.fstat(file.fileno()).st_size
         if size > _GROWTH:
@@ -133,24 +115,12 @@ def read_input(path: str | os.PathLike[str], *, largest: int = LARGEST) -> bytes
 
 
 def require_input(path: str | os.PathLike[str], *, largest: int = LARGEST) -> None:
-    """Refuse what `open_input` refuses.
-
-    Raises
-    ------
-    FileFormatError
-        As for `open_input`.
-    """
+    """Refuse what `open_input` refuses."""
     open_input(path, largest=largest).close()
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read a TOML file; its texts are plain, see `plain_text`.
-
-    Raises
-    ------
-    FileFormatError
-        If it can't be read, or is no TOML.
-    """
+    """Read a TOML file; its texts are plain, see `plain_text`."""
     try:
         text = read_input(path, largest=_TOML_LARGEST).decode()
         if _DEEP_KEY.search(text):  # which takes the parser minutes

@@ -45,18 +45,10 @@ _RAISED = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "+-0123456789")
 
 @dataclass(frozen=True)
 class NumberText:
-    """The number at the beginning of a text, and what follows it.
+    """The number at the beginning of a text, and what follows it."""
 
-    Attributes
-    ----------
-    value : Fraction
-        The number, exactly.
-    rest : str
-        The text behind it, without blanks around it.
-    """
-
-    value: Fraction
-    rest: str
+    value: Fraction  # the number, exactly
+    rest: str  # the text behind it, without blanks around it
 
 
 def plain_text(text: str) -> str:
@@ -78,18 +70,9 @@ def plain_digits(body: str, decimal: str) -> str | None:
 
 
 def leading_number(text: str) -> NumberText:
-    """Return the number at the beginning of a text, exactly, and what follows it.
+    """Return the number at the beginning of a text, such as ``"10,5kPa"`` or ``"−1 000 mm"``, exactly, and the rest.
 
-    Parameters
-    ----------
-    text : str
-        For example ``"10,5kPa"`` or ``"−1 000 mm"``.
-
-    Raises
-    ------
-    UsageError
-        If the text does not begin with a number, the comma in it allows two readings, or it is too large or too small
-        for a float.
+    A comma that allows two readings, and a number too large or too small for a float, are refused.
     """
     shown = text.strip()
     if not shown:
@@ -111,13 +94,7 @@ def leading_number(text: str) -> NumberText:
 
 
 def whole_number(text: str) -> int:
-    """Return a whole number, exactly.
-
-    Raises
-    ------
-    UsageError
-        If the text is no whole number.
-    """
+    """Return a whole number, exactly."""
     number = leading_number(text)
     if number.rest or number.value.denominator != 1:
         raise UsageError(

@@ -60,12 +60,9 @@ _COMMENTS = {
 
 _SENTENCE = "Written by palpate; the next export replaces this file unless it was changed. Checksum "
 _LAST_LINE = re.compile(rb"[^\n]*" + re.escape(_SENTENCE.encode()) + rb"([0-9a-f]{16})[^\n]*\n\Z")
-_LONGEST_LINE = 200
-_ACTING = {
-    "interaction",
-    "loads",
-    "probe",
-}  # what a study has one of, the latter two in files of version 0.1.0
+_LONGEST_LINE = 200  # bytes at the end of a file in which its mark stands
+# a study has one of these, the latter two in files of version 0.1.0
+_ACTING = {"interaction", "loads", "probe"}
 _LIBRARIES = {".so", ".dylib", ".dll"}
 _TABLES = {".csv", ".parquet", ".nc", ".npz"}  # formats without a place for a mark
 # what names palpate in other formats, and in how many bytes from the start
@@ -90,24 +87,9 @@ def require_outputs(
 ) -> None:
     """Refuse files that can't be written, or that are there and are not palpate's to replace.
 
-    Parameters
-    ----------
-    files : iterable of path
-        Files that are about to be written.
-    endings : tuple of str
-        Endings of which each file has one, such as ``".fmu"``; by default any.
-    folder : path, optional
-        Folder of the files that the export makes itself; by default the files lie in folders that exist.
-    inputs : iterable of path
-        Files that are read: none of them is replaced.
-    overwrite : bool
-        True also replaces tables, and files of palpate's that somebody changed.
-
-    Raises
-    ------
-    UsageError
-        If an ending is another one, a folder or a device stands where a file goes or the reverse, the folder around is
-        missing, or a file exists that is not to be replaced.
+    `endings` are those of which each file has one, such as ``".fmu"``; by default any. `folder` is one that the export
+    makes itself; otherwise the files lie in folders that exist. None of the `inputs` is replaced. `overwrite` also
+    replaces tables, and files of palpate's that somebody changed.
     """
     paths = [Path(file) for file in files]
     place = None if folder is None else Path(folder)
@@ -177,12 +159,7 @@ def free_path(path: str | os.PathLike[str]) -> Path:
 def with_seal(file: str | os.PathLike[str], text: str) -> str:
     """Return a text with a last line that lets a later export replace it; a format without comments as it stands.
 
-    Parameters
-    ----------
-    file : path
-        Name of the file, whose ending tells how comments are written.
-    text : str
-        Its content.
+    The ending of the file's name tells how comments are written.
     """
     comment = _COMMENTS.get(Path(file).suffix.lower())
     if comment is None:
@@ -211,9 +188,8 @@ def is_own(path: Path) -> bool:
         return all(name + function in content for function in (b"_hash", b"_limits", b"_deviation"))
     if ending in {".json", ".fmu"}:
         return _is_card(content) if ending == ".json" else _is_fmu(path)
-    return ending == ".palpate" or _is_archive(
-        content
-    )  # nobody else has that ending, and a damaged one is no loss
+    # nobody else has that ending, and a damaged file is no loss
+    return ending == ".palpate" or _is_archive(content)
 
 
 def _is_archive(content: bytes) -> bool:

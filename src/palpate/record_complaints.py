@@ -19,7 +19,7 @@ from palpate.records import Unit
 
 __all__ = ["complaints", "range_words", "unit_in"]
 
-_LONGEST = 60  # characters of what a complaint repeats
+_LONGEST = 60  # characters of an input that a complaint repeats
 _BOUNDS = {"greater_than": "gt", "greater_than_equal": "ge", "less_than": "lt", "less_than_equal": "le"}
 _KINDS = {
     "float": "number",
@@ -45,14 +45,7 @@ class _Place:
 def complaints(error: ValidationError, model: type[BaseModel], whole: str = "study") -> Iterator[str]:
     """Yield one line per mistake: the key, what is wrong with it, what is allowed, and an example.
 
-    Parameters
-    ----------
-    error : ValidationError
-        What Pydantic found.
-    model : type
-        The record that was read.
-    whole : str
-        How the record is called, for mistakes of no single key.
+    `whole` is how the record is called, for mistakes of no single key.
     """
     items = [(_place(item["loc"], model), item) for item in error.errors(include_url=False)]
     by_keys: dict[tuple[str, ...], list[str]] = {}
@@ -203,15 +196,7 @@ def _limits(field: FieldInfo) -> dict[str, float]:
 
 
 def range_words(limits: dict[str, float], unit: str = "") -> str:
-    """Return a range in words.
-
-    Parameters
-    ----------
-    limits : dict of str to float
-        Bounds by how they bind: gt, ge, lt and le.
-    unit : str
-        Unit of the bounds.
-    """
+    """Return a range in words; the limits are by how they bind: gt, ge, lt and le."""
     words = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
     return " and ".join(f"{words[k]} {limits[k]:.6g} {unit}".rstrip() for k in words if k in limits)
 

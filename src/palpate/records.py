@@ -33,15 +33,9 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Unit:
-    """Annotation of a float field that takes a number in this unit, or text with a unit of the same dimension.
+    """Annotation of a float field that takes a number in this unit, or text with a unit of the same dimension."""
 
-    Attributes
-    ----------
-    name : str
-        SI unit, such as "m"; "" for a pure number.
-    """
-
-    name: str
+    name: str  # SI unit, such as "m"; "" for a pure number
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(partial(in_si, unit=self.name), handler(source))
@@ -72,10 +66,7 @@ def _whole(value: Any) -> Any:
 def in_si(value: Any, unit: str | None) -> float:
     """Return a quantity of a record as a number in this unit; None: a text of any dimension, in SI base units.
 
-    Raises
-    ------
-    ValueError
-        If it is not a quantity, or has another dimension. Pydantic collects these errors.
+    It raises `ValueError`, which Pydantic collects.
     """
     try:
         return parse_quantity(value, unit)

@@ -21,25 +21,14 @@ HEAD = 18
 # and blosc hands each of its blocks to one of these or to LZ4, which gives 255
 _DEFLATE, _ZSTD, _SLACK = 1032, 1 << 15, 1 << 17
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-_BLOSC_HEAD = 16
+_BLOSC_HEAD = 16  # bytes of the head of a Blosc frame
 
 
 def promised_size(codec: str, head: bytes, length: int) -> int:
-    """Return the size in bytes that a chunk promises.
+    """Return the size in bytes that a chunk promises; a `ValueError` says that so many bytes can't hold so much.
 
-    Parameters
-    ----------
-    codec : str
-        Zarr's name of the compressor: ``"zstd"`` or ``"blosc"``.
-    head : bytes
-        The first `HEAD` bytes of the chunk, or all of it.
-    length : int
-        Number of bytes of the whole chunk.
-
-    Raises
-    ------
-    ValueError
-        If the head is not one of this compressor, or promises more than so many bytes can hold.
+    The codec is Zarr's name of the compressor, ``"zstd"`` or ``"blosc"``; `head` are the first `HEAD` bytes of the
+    chunk, or all of it, and `length` is the whole chunk's number of bytes.
     """
     if codec == "zstd":
         size, ratio = _zstd_size(head), _ZSTD
@@ -77,13 +66,7 @@ def _blosc_size(head: bytes, length: int) -> int:
 
 
 def require_deflated(size: int, length: int) -> None:
-    """Refuse a promise of `size` bytes by `length` bytes that deflate made.
-
-    Raises
-    ------
-    ValueError
-        If so few bytes can't hold so many.
-    """
+    """Refuse, by a `ValueError`, a promise of `size` bytes by so few (`length`) bytes that deflate made."""
     if size > _DEFLATE * length + _DEFLATE:
         raise ValueError(f"{length} bytes promise {size:,}")
 
@@ -91,12 +74,7 @@ def require_deflated(size: int, length: int) -> None:
 def require_npz(file: IO[bytes]) -> None:
     """Refuse a NumPy archive with an array that promises another size than its member has.
 
-    Raises
-    ------
-    ValueError
-        Naming the member.
-    zipfile.BadZipFile
-        If it is no archive.
+    A `ValueError` names the member.
     """
     with zipfile.ZipFile(file) as archive:
         for member in archive.infolist():

@@ -45,12 +45,10 @@ GRACE = 5.0  # s after a call's limit in which the child ends by itself, with th
 _LOOK = 0.05  # s between looks at the memory of a child
 _IDLE = 10.0  # s without a call after which a shared child is ended
 READER = "read_requests"  # the function of a child's second thread, whose place is of no interest
-_OWN_FRAMES = ("supervised_child.py", "<frozen runpy>")  # below those of the work
+_OWN_FRAMES = ("supervised_child.py", "<frozen runpy>")  # files of the frames below those of the work
 _READ_SECONDS, _READ_RATE = 40.0, 5e5  # s that reading any file may take; bytes for each s more
-_READ_MEMORY, _READ_GROWTH = (
-    1.5e9,
-    50.0,
-)  # bytes that reading may take; more for each byte of a file, packed ones too
+# bytes that reading may take; more for each byte of a file, packed ones too
+_READ_MEMORY, _READ_GROWTH = 1.5e9, 50.0
 _HEAD = struct.Struct(">Q")
 _DETAILS = 4000  # characters of the child's last words that are kept
 
@@ -66,21 +64,11 @@ def _folder() -> str | None:
 
 
 class ChildEnded(SolverError):
-    """A child process was ended by what it was asked to do.
+    """A child process was ended by what it was asked to do."""
 
-    Attributes
-    ----------
-    overdue : bool
-        True where it was ended because the call took longer than its limit.
-    reason : str
-        The end in words: a signal, an exit code, a limit.
-    details : str
-        What the process wrote last, with the traceback of the moment where there is one.
-    """
-
-    overdue = False
-    reason = ""
-    details = ""
+    overdue = False  # whether it was ended because the call took longer than its limit
+    reason = ""  # the end in words: a signal, an exit code, a limit
+    details = ""  # what the process wrote last, with the traceback of the moment where there is one
 
 
 class RemoteTraceback(Exception):
@@ -113,25 +101,11 @@ class Child:
     def call(
         self, function: Callable[..., Result], *arguments: Any, limit: float, memory: float = math.inf
     ) -> Result:
-        """Call a function of a module, with arguments that can be pickled, in the child.
+        """Call a function at the top of a module, with arguments that can be pickled, in the child.
 
-        Parameters
-        ----------
-        function : callable
-            Defined at the top of a module, where the child finds it.
-        *arguments
-            Of the function; relative paths start from this process's working directory.
-        limit : float
-            Time in s after which the child is ended.
-        memory : float
-            Number of bytes of memory in use above which the child is ended.
-
-        Raises
-        ------
-        ChildEnded
-            If the call ends the process, takes longer, or takes more memory.
-        BaseException
-            What the function raised; its cause is a `RemoteTraceback`.
+        Relative paths start from this process's working directory. A call that takes longer than `limit` seconds, or
+        more than `memory` bytes, ends the child: `ChildEnded`. What the function raises is raised here, caused by a
+        `RemoteTraceback`.
         """
         import cloudpickle
 
@@ -311,21 +285,8 @@ def run_in_child(
 def read_in_child(function: Callable[..., Result], path: Path, *arguments: Any) -> Result:
     """Return what a reader in C or C++ makes of a file, read in a child process: a damaged file may crash it.
 
-    Time and memory that it may take grow with the file's size.
-
-    Parameters
-    ----------
-    function : callable
-        Reader, defined at the top of a module; takes the path and the arguments.
-    path : Path
-        The file.
-    *arguments
-        Of the reader.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is none, or if the reader crashes, does not end or takes far more memory than the file is large.
+    Time and memory that it may take grow with the file's size. The reader is defined at the top of a module; it takes
+    the path and the arguments.
     """
     require_input(path)
     size = path.stat().st_size

@@ -46,15 +46,7 @@ def registry() -> Any:
 def si_conversion(unit: str) -> tuple[float, float, str]:
     """Return factor, offset and SI unit: a value v in `unit` is factor · v + offset in the SI unit.
 
-    Parameters
-    ----------
-    unit : str
-        For example ``"mm"``, ``"N/mm²"`` or ``"°C"``; "" and "1" are pure numbers, whose SI unit is "".
-
-    Raises
-    ------
-    UsageError
-        If there is no such unit.
+    The unit is such as ``"mm"``, ``"N/mm²"`` or ``"°C"``; "" and "1" are pure numbers, whose SI unit is "".
     """
     if unit.strip() in {"", "1"}:
         return 1.0, 0.0, ""
@@ -101,19 +93,9 @@ def usual_unit(unit: str) -> str:
 def conversion_to(text: str, unit: str | None) -> tuple[Fraction, Fraction]:
     """Return factor and offset, exactly where they are short, from a unit as people write it to the SI unit wanted.
 
-    A value v in the unit of the text is factor · v + offset in `unit`. Pint gets the unit alone.
-
-    Parameters
-    ----------
-    text : str
-        A unit such as ``"kPa"``, ``"N/mm²"``, ``"mm2"`` or ``"kpa"``, whose case is wrong and can mean one thing only.
-    unit : str or None
-        SI unit whose dimension the text must have; "" for pure numbers, None for any.
-
-    Raises
-    ------
-    UsageError
-        If the text is no unit, or one of another dimension, or allows two readings.
+    A value v in the unit of the text is factor · v + offset in `unit`; "" is for pure numbers, None for any dimension.
+    The text may be ``"kPa"``, ``"N/mm²"``, ``"mm2"`` or ``"kpa"``, whose case is wrong and can mean one thing only.
+    Pint gets the unit alone.
     """
     pieces = list(_pieces(text))
     exact = _joined(pieces)
@@ -134,11 +116,8 @@ def _pieces(text: str) -> Iterator[str]:
         raise UsageError(f"'{text[:20]}…' has too many characters for a unit.")
     if text.count("%") > 1:
         raise UsageError(f"{text!r} is no unit: a share is in % once.")
-    place, below, operand = (
-        0,
-        [False],
-        False,
-    )  # of each open bracket: whether a slash came; whether a name came last
+    # place in the text; of each open bracket, whether a slash came; whether a name came last
+    place, below, operand = 0, [False], False
     while place < len(text):
         match = _PIECE.match(text, place)
         if match is None:

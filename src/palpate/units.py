@@ -88,31 +88,13 @@ def parse_quantity(value: str | float, unit: str | None, name: str = "", *, bare
     """Return a quantity that a person has written, such as ``"110 GPa"`` or ``"10,5kPa"``, in an SI unit.
 
     Every text that means a quantity comes through here: a number, and then its unit. A decimal comma and marks between
-    thousands are understood where they allow one reading, as in tables. So is a unit in the wrong case, such as that
-    of ``"10 kpa"``.
+    thousands are understood where they allow one reading, as in tables. So is a unit in the wrong case, such as that of
+    ``"10 kpa"``.
 
-    Parameters
-    ----------
-    value : str or float
-        Text with a number and a unit; a number, which is no text, is taken to be in `unit` already.
-    unit : str or None
-        The SI unit wanted, for example ``"Pa"``; "" for a pure number, which a text may give in %, too. None: a
-        quantity of any dimension, in SI base units.
-    name : str
-        What the quantity is, for messages, such as ``"--young"``.
-    bare : bool
-        True where a text without a unit, too, is a number in `unit`, as behind options whose help names the unit.
-
-    Returns
-    -------
-    float
-        The value in `unit`; digits are rounded once.
-
-    Raises
-    ------
-    UsageError
-        If the value is neither a finite number nor a text that says one, has no unit or one of another dimension, or if
-        a comma or the case of the unit allows two readings.
+    A number, which is no text, is taken to be in `unit` already. "" is a pure number, which a text may give in %, too;
+    None is a quantity of any dimension, in SI base units. `name` is what it is, for messages, such as ``"--young"``.
+    `bare` is True where a text without a unit, too, is a number in `unit`, as behind options whose help names the unit.
+    Digits are rounded once.
     """
     try:
         if not isinstance(value, str):

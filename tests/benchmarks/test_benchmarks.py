@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from benchmarks.records import Record
 from benchmarks.surrogate_plots import curves
 from benchmarks.surrogate_rivals import RIVALS
 from benchmarks.touch_studies import STUDIES
@@ -31,17 +32,13 @@ def run(*arguments):
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
-    path = tmp_path_factory.mktemp("benchmarks") / "page.md"
-    path.write_text(
-        "before\n<!-- benchmark runtime: begin -->\nold\n<!-- benchmark runtime: end -->\nafter\n"
-    )
-    return path
+def records(tmp_path_factory):
+    return tmp_path_factory.mktemp("benchmarks") / "records"
 
 
 @pytest.fixture(scope="module")
-def quick(page):
-    return json.loads(run("--quick", "--json", "--into", str(page)))
+def quick(records):
+    return json.loads(run("--quick", "--json", "--record", str(records)))
 
 
 @pytest.fixture(scope="module")
@@ -156,24 +153,16 @@ def test_curves_of_error_are_drawn_for_the_studies_that_were_measured(tables, tm
     assert heights[1] == math.ceil(len(STUDIES) / 3) * heights[0]
 
 
-def test_documentation_holds_a_block_for_every_table(tables):
-    docs = ROOT / "docs"
-    pages = (docs / "benchmarks.md", docs / "trust.md", docs / "method" / "published-tables.md")
-    text = "".join(page.read_text(encoding="utf-8") for page in pages)
+def test_every_table_has_a_record(tables):
     for name, table in tables.items():
-        begin, end = (f"<!-- benchmark {name}: {edge} -->" for edge in ("begin", "end"))
-        block = text.partition(begin)[2].partition(end)[0]
-        assert "|" in block, name
-        assert "quick" not in block, "figures of a quick run mean nothing"
-        titles = next(line for line in block.splitlines() if line.startswith("| "))
-        assert len(titles.split("|")) > 4, table["title"]
+        record = Record.read(name)
+        assert len(record.columns) > 2, table["title"]
+        assert "quick" not in record.title, "figures of a quick run mean nothing"
 
 
-def test_blocks_are_replaced_in_place(quick, page):
-    text = page.read_text()
-    assert text.startswith("before\n")
-    assert text.endswith("\nafter\n")
-    assert "old" not in text
-    loop = next(table for table in quick["tables"] if table["name"] == "runtime")
-    assert str(loop["rows"][0]["ticks"]) in text
-    assert quick["machine"]["processor"] in text
+def test_what_was_measured_is_written_down(quick, tables, records):
+    assert {path.stem for path in records.iterdir()} == set(tables)
+    record = Record.read("runtime", records)
+    assert str(tables["runtime"]["rows"][0]["ticks"]) in record.rows[0]
+    assert quick["machine"]["processor"] in record.machine
+    assert len(record.claims) == len(tables["runtime"]["claims"])

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import pressed as slab
+from palpate.devices.trace_file import TraceWriter, read_trace
 from palpate.errors import SolverError, UsageError
 from palpate.runtime.touchable import touchable
 from palpate.runtime.trace_export import trace_table
-from palpate.runtime.trace_file import TraceWriter, read_trace
 from palpate.units import Range
 from palpate.validation.full_model import compare_full_model, stroke_moments
 from palpate.validation.limits import FAINT_JND

@@ -151,6 +151,28 @@ def test_no_circle_of_imports():
     list(graphlib.TopologicalSorter(graph).static_order())  # raises CycleError, which names the circle
 
 
+def test_no_module_of_palpate_is_imported_by_name():
+    """The import contract in pyproject.toml sees no import that is a string.
+
+    The importers below load modules of a person, whose names stand in files, and a wrapper that was just written.
+    """
+    by_name = {"import_module", "__import__", "spec_from_file_location", "run_module"}
+    calls = [
+        (str(file), node)
+        for file in files()
+        for node in ast.walk(tree(file))
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) in by_name
+    ]
+    assert {file for file, _ in calls} == {
+        "export/check_library.py",
+        "network/kinds.py",
+        "physics/materials/user.py",
+        "study/material_records.py",
+    }
+    own = re.compile(r"[\"']palpate\b")
+    assert not [file for file, call in calls if own.search(ast.unparse(call))]
+
+
 def test_the_package_is_typed_and_its_version_is_one():
     import tomllib
 

@@ -7,7 +7,7 @@ import math
 import pytest
 
 import pressed
-from palpate.runtime.devices.device import Sample, Traits
+from palpate.devices.device import Sample, Traits
 from palpate.runtime.loop import Loop
 from palpate.runtime.realtime import SLOW, Metronome, Rest
 from palpate.runtime.safety import Limits

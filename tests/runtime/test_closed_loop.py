@@ -14,13 +14,14 @@ import pytest
 import held
 import pressed
 from models import spring_beam
+from palpate.devices.device import PLAIN_AXES
+from palpate.devices.simulated import SimulatedHand, SimulatedSettings
 from palpate.errors import UsageError
-from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.touchable import touchable
-from palpate.runtime.workspace import PLAIN_AXES, HandFrame, Workspace
+from palpate.runtime.workspace import HandFrame, Workspace
 from palpate.surrogates.memories import Relaxation
 
 LIMITS = Limits(12.0)

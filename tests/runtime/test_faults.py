@@ -7,13 +7,13 @@ import signal
 import time
 
 import pytest
+from benchmarks.fault_injection import FAULTS, FaultInjector
 
 import pressed
 from models import spring_beam
+from palpate.devices.doubles.haply_simulator import HaplySimulator, SimulatorSettings
 from palpate.errors import UsageError
 from palpate.runtime import LoopProcess
-from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
-from palpate.runtime.fault_injection import FAULTS, FaultInjector
 from palpate.runtime.safety import Fault
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.memories import Relaxation

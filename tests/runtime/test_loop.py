@@ -6,17 +6,17 @@ import math
 
 import numpy as np
 import pytest
-from standins import STIFFNESS, PlainModel
 
+from palpate.devices.device import Sample, Traits
+from palpate.devices.page import PageDevice
+from palpate.devices.simulated import SimulatedHand, SimulatedSettings
+from palpate.devices.tick_record import MAX_INPUTS
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
-from palpate.runtime.devices.device import Sample, Traits
-from palpate.runtime.devices.page import PageDevice
-from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Fault, Limits
-from palpate.runtime.shared_state import MAX_INPUTS
 from palpate.runtime.workspace import Workspace
 from palpate.units import Range
+from standins import STIFFNESS, PlainModel
 
 TICK = 1e-3
 WORKSPACE = Workspace.for_reach(0.075, 0.25)

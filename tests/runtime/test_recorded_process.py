@@ -19,12 +19,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from palpate.devices.tick_record import TICK
+from palpate.devices.trace_file import COLUMNS, FORMAT, VERSION, TraceWriter, read_trace
 from palpate.errors import FileFormatError, ResourceError, UsageError
 from palpate.runtime import LoopProcess, now
-from palpate.runtime.recording import TICK
 from palpate.runtime.replay import Replay, is_recorded_model
 from palpate.runtime.touchable import load_touchable
-from palpate.runtime.trace_file import COLUMNS, FORMAT, VERSION, TraceWriter, read_trace
 
 
 def wait_for(condition, seconds=20.0):

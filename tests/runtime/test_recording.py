@@ -11,12 +11,13 @@ import pytest
 import held
 import pressed
 from models import spring_beam
+from palpate.devices import device_named, device_traits
+from palpate.devices.device import Sample, Traits
+from palpate.devices.page import PageDevice
+from palpate.devices.simulated import SimulatedHand, SimulatedSettings
+from palpate.devices.stroke import StrokeDevice, StrokeSettings
+from palpate.devices.trace_file import read_trace
 from palpate.errors import DeviceError, UsageError
-from palpate.runtime.devices import device_named, device_traits
-from palpate.runtime.devices.device import Sample, Traits
-from palpate.runtime.devices.page import PageDevice
-from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
-from palpate.runtime.devices.stroke import StrokeDevice, StrokeSettings
 from palpate.runtime.loop import Loop
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.recorder import TraceRecorder
@@ -25,7 +26,6 @@ from palpate.runtime.replay import Replay, loop_facts, play
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.touchable import touchable
-from palpate.runtime.trace_file import read_trace
 from palpate.surrogates.memories import Relaxation
 
 LIMITS = Limits(12.0)

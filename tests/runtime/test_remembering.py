@@ -7,8 +7,8 @@ import pytest
 from test_process import wait_for, watch
 
 from bent import CREEPS, REACH, STIFFNESS, D, body
+from palpate.devices.device import Sample, Traits
 from palpate.runtime import LoopProcess, now
-from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared

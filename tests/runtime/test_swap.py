@@ -11,9 +11,10 @@ import pytest
 import held
 import pressed
 from models import spring_beam
+from palpate.devices.device import Sample, Traits
+from palpate.devices.simulated import SimulatedHand, SimulatedSettings
+from palpate.devices.trace_file import read_trace
 from palpate.errors import UsageError
-from palpate.runtime.devices.device import Sample, Traits
-from palpate.runtime.devices.simulated import SimulatedHand, SimulatedSettings
 from palpate.runtime.handover import hand_over, prepared, take
 from palpate.runtime.loop import Loop
 from palpate.runtime.recorder import TraceRecorder
@@ -23,7 +24,6 @@ from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.swap import swap_between
 from palpate.runtime.touchable import touchable
-from palpate.runtime.trace_file import read_trace
 from palpate.surrogates import Surrogate
 from palpate.surrogates.memories import Indentation, IwanElements, Patches, Relaxation
 

@@ -11,11 +11,11 @@ import pytest
 
 import held
 import pressed
+from palpate.devices.trace_file import read_trace
 from palpate.errors import DeviceError, FileFormatError, UsageError
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.replay import Replay, is_recorded_model
 from palpate.runtime.touchable import load_touchable
-from palpate.runtime.trace_file import read_trace
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import palpate as pp
+from palpate.devices.tick_record import TICK
+from palpate.devices.trace_file import Trace
 from palpate.physics import Cantilever, Circle, LinearElastic, PointLoad
-from palpate.runtime.recording import TICK
-from palpate.runtime.trace_file import Trace
 from palpate.validation.full_model import compare_full_model
 from palpate.validation.report import write
 from palpate.validation.report.trace_pictures import comparison_pictures

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -160,6 +162,23 @@ def test_a_notebook_shows_the_page(pressed: Surrogate):
     assert "<title>&lt;b&gt;body&lt;/b&gt;" in bare.to_html()
     hostile = replace(pressed, meta={"name": "<!--<script>"}).to_html()
     assert "<!--" not in hostile.partition("<body>")[2].replace("palpate-card", "")
+
+
+def test_a_body_that_was_loaded_shows_itself_without_the_viewer_being_imported(
+    pressed: Surrogate, tmp_path: Path
+):
+    file = pressed.save(tmp_path / "slab.palpate")
+    program = """
+import sys
+import palpate as pp
+body = pp.load(sys.argv[1])
+assert "palpate.viewer" not in sys.modules
+print(body._repr_html_()[:15])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(file)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "<iframe srcdoc="
 
 
 def test_the_surface_and_its_fields_are_those_of_the_body(

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from palpate.devices.trace_file import read_trace
 from palpate.runtime.replay import Replay
-from palpate.runtime.trace_file import read_trace
 from palpate.viewer import Viewer
 from palpate.viewer.messages import Recording, RecordWish
 from websocket_page import client_of

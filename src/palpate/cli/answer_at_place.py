@@ -21,33 +21,17 @@ _NOTHING = 1e-9  # N: first touch, but for round-off
 
 @dataclass(frozen=True)
 class Answer:
-    """Answer of an energy at one place.
+    """Answer of an energy at one place."""
 
-    Attributes
-    ----------
-    inputs : (n,)
-        In the inputs' units.
-    energy : float
-        J.
-    force : (3,)
-        N.
-    stiffness : (3, 3)
-        ∂F/∂c by the first three inputs c, N/m.
-    deviation : float
-        Of the force, relative to its size; not-a-number where it is not known, as beyond the ranges.
-    inside : bool
-        True if the place lies in what was trained.
-    deepest : float, optional
-        How far inside the touched surface (m) the probe's centre could go; given where the loop lets go of it. Energy,
-        force and stiffness are not-a-number there.
-    """
-
-    inputs: np.ndarray
-    energy: float
-    force: np.ndarray
-    stiffness: np.ndarray
+    inputs: np.ndarray  # (n,) in the inputs' units
+    energy: float  # J
+    force: np.ndarray  # (3,) in N
+    stiffness: np.ndarray  # (3, 3) ∂F/∂c by the first three inputs c, N/m
+    # of the force, relative to its size; not-a-number where it is not known, as beyond the ranges
     deviation: float
-    inside: bool
+    inside: bool  # whether the place lies in what was trained
+    # how far inside the touched surface (m) the probe's centre could go, where the loop lets go of it; energy, force
+    # and stiffness are not-a-number there
     deepest: float | None = None
 
     def words(self, names: Sequence[Range]) -> str:
@@ -113,28 +97,14 @@ class Answer:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Outputs at one place.
+    """Outputs at one place."""
 
-    Attributes
-    ----------
-    inputs : (n,)
-        In the inputs' units.
-    outputs : m quantities
-        Names and units of the outputs.
-    values : (m,)
-        Values, in the outputs' units.
-    deviations : (m,), optional
-        Standard deviation of what would be measured; None where the file has none. Beyond the ranges it says nothing
-        and is not-a-number.
-    inside : bool, optional
-        True if a training sample is near; None where the file does not tell.
-    """
-
-    inputs: np.ndarray
-    outputs: tuple[Quantity, ...]
-    values: np.ndarray
+    inputs: np.ndarray  # (n,) in the inputs' units
+    outputs: tuple[Quantity, ...]  # names and units of the m outputs
+    values: np.ndarray  # (m,) in the outputs' units
+    # (m,) of what would be measured; None where the file has none, not-a-number beyond the ranges
     deviations: np.ndarray | None
-    inside: bool | None
+    inside: bool | None  # whether a training sample is near; None where the file does not tell
 
     def words(self, names: Sequence[Range]) -> str:
         """Return the answer as lines for a person."""
@@ -159,21 +129,11 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Deflection:
-    """Displacement of a beam under its loads.
+    """Displacement of a beam under its loads."""
 
-    Attributes
-    ----------
-    inputs : (n,)
-        Loads in N.
-    nodes : (k, 3)
-        Nodes of interest at rest, m.
-    displacement : (k, 3)
-        Their displacement, m.
-    """
-
-    inputs: np.ndarray
-    nodes: np.ndarray
-    displacement: np.ndarray
+    inputs: np.ndarray  # (n,) loads in N
+    nodes: np.ndarray  # (k, 3) nodes of interest at rest, m
+    displacement: np.ndarray  # (k, 3) of these nodes, m
 
     def words(self, names: Sequence[Range]) -> str:
         """Return the displacement of each node of interest as lines for a person."""

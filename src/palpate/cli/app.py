@@ -90,7 +90,7 @@ def _root(
     version: Annotated[bool, typer.Option("--version", help="Print the version.", is_eager=True)] = False,
 ) -> None:
     if version:
-        from palpate import __version__
+        from palpate.version import __version__
 
         typer.echo(f"palpate {__version__}")
         raise typer.Exit

@@ -26,7 +26,7 @@ from palpate.units import Range, parse_quantity
 
 __all__ = ["answers_at", "ask", "deflections", "inputs_of"]
 
-_STEPS = 16  # in a radius
+_STEPS = 16  # steps along a way, in a radius
 _NOUNS = {
     "Surrogate": "A learnt body",
     "Fitted": "A network of data, with intervals",
@@ -36,15 +36,7 @@ _NOUNS = {
 
 
 def ask(model: Path, at: Sequence[str], console: Console) -> None:
-    """Print the content of a file, or with places its answers there.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is missing or damaged.
-    UsageError
-        If a place is not as many numbers as there are inputs, or what the file holds has no answer to a place.
-    """
+    """Print the content of a file, or with places its answers there."""
     contents = load(model)
     what, inputs = type(contents).__name__, inputs_of(contents)
     if not at:

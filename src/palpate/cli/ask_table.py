@@ -36,29 +36,10 @@ def ask_table(
     *,
     force: bool = False,
 ) -> None:
-    """Answer for all rows of a table, in its order; the answers go to a file or to stdout.
+    """Answer for all rows of a table, in its order; the answers go to a file, or to stdout.
 
-    Parameters
-    ----------
-    model : Path
-        Model file of a network of arrays, or of a body that is pressed or gripped.
-    path : Path
-        The table. Columns are matched by name, others are left out, units are converted.
-    out : Path, optional
-        File for the answers; by default stdout.
-    console : Console
-        Takes notes and results.
-    reading : mapping
-        How the table is written, as `palpate.tables.read_table` takes it.
-    force : bool
-        True to replace a table that exists.
-
-    Raises
-    ------
-    FileFormatError
-        If model or table can't be read.
-    UsageError
-        If a column is missing or its unit is not the model's, or the model has no answer to a place.
+    Columns are matched by name, others are left out, units are converted. `reading` is how the table is written, as
+    `palpate.tables.read_table` takes it; `force` replaces a table that exists.
     """
     contents = load(model)
     if not isinstance(contents, Surrogate | Fitted | Network):

@@ -46,15 +46,9 @@ def advice_in_words() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Console:
-    """Printer of a command.
+    """Printer of a command."""
 
-    Attributes
-    ----------
-    as_json : bool
-        Results as one JSON object on stdout, and no progress.
-    """
-
-    as_json: bool = False
+    as_json: bool = False  # results as one JSON object on stdout, and no progress
 
     def say(self, text: str) -> None:
         """Print one line of progress to stderr."""

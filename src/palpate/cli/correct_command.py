@@ -33,34 +33,17 @@ _OFTEN = 100  # measurements between two lines of progress
 
 @dataclass(frozen=True)
 class Source:
-    """Source of measurements: one of a file, standard input, a port.
+    """Source of measurements: one of a file, standard input, a port."""
 
-    Attributes
-    ----------
-    file : Path, optional
-        Table of measurements.
-    stdin : bool
-        True to read lines from standard input.
-    port : int, optional
-        Port of 127.0.0.1 at which one connection is awaited; 0: any free port.
-    stall, wait : float
-        Seconds of silence that end a stream, and that a connection is waited for.
-    missing : str
-        For a file: "leave-out" or "refuse" rows in which a value is missing.
-    options : mapping, optional
-        For a file: how the table is written, as `palpate.tables.read_table` takes it.
-    token : bool
-        Whether a connection must begin with the token that is printed.
-    """
-
-    file: Path | None
-    stdin: bool
-    port: int | None
-    stall: float
-    wait: float
-    missing: str = "leave-out"
+    file: Path | None  # table of measurements
+    stdin: bool  # whether to read lines from standard input
+    port: int | None  # of 127.0.0.1 at which one connection is awaited; 0: any free port
+    stall: float  # seconds of silence that end a stream
+    wait: float  # seconds that a connection is waited for
+    missing: str = "leave-out"  # for a file: "leave-out" or "refuse" rows in which a value is missing
+    # for a file: how the table is written, as `palpate.tables.read_table` takes it
     options: Mapping[str, Any] | None = None
-    token: bool = True
+    token: bool = True  # whether a connection must begin with the token that is printed
 
     def __post_init__(self) -> None:
         if (self.file is not None) + self.stdin + (self.port is not None) != 1:
@@ -80,14 +63,8 @@ def correct_model(
 ) -> None:
     """Correct a model and write it; errors before and after go to stdout.
 
-    Raises
-    ------
-    UsageError
-        If files or options do not fit, or nothing was learnt.
-    DeviceError
-        If nobody connects to the port.
-    AccuracyError
-        If the forces have another sign, or may have another unit, than the model's; everything has been written then.
+    An `AccuracyError` says, after everything has been written, that the forces have another sign, or may have another
+    unit, than the model's.
     """
     body = Surrogate.load(model)
     if body.energy.baseline.holds:

@@ -32,31 +32,10 @@ def import_files(
     overwrite: bool,
     console: Console,
 ) -> None:
-    """Read results of another solver, print what they hold, and write a dataset.
+    """Read results of another solver, all of one model, print what they hold, and write a dataset.
 
-    Parameters
-    ----------
-    files : sequence of Path
-        Files of one model.
-    mapping : Path, optional
-        TOML file that says what the columns are.
-    options : Options
-        The same in words, which go before the file.
-    out : Path, optional
-        Dataset to write; by default the first file's name with ``.zarr``.
-    test : float
-        Share of the cases that go to a test set of their own, ``NAME-test.zarr``.
-    dry_run : bool
-        True only prints: nothing is written.
-    overwrite : bool
-        True replaces datasets that exist.
-    console : Console
-        Printer of the result.
-
-    Raises
-    ------
-    FileFormatError, UsageError
-        If a file can't be read, or the mapping doesn't fit.
+    The options go before the TOML file of the mapping. The dataset is by default the first file's name with ``.zarr``;
+    the share `test` of the cases goes to a test set of their own, ``NAME-test.zarr``. `dry_run` only prints.
     """
     from palpate.dataset.readers import import_results, read_mapping
     from palpate.dataset.readers.import_results import read_files

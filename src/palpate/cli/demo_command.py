@@ -26,17 +26,9 @@ def run_demo(
     quick: bool = False,
     case_limit: float = CASE_LIMIT,
 ) -> list[Path]:
-    """Carry out studies one after the other on one cluster, and report on all of them together.
+    """Carry out studies one after the other on one cluster, report on all together, and return the models' files.
 
-    Returns
-    -------
-    list of Path
-        Files of the models.
-
-    Raises
-    ------
-    AccuracyError
-        After everything is written, if a study missed its target.
+    If a study missed its target, an `AccuracyError` says so after everything is written.
     """
     studies = [preset_study(name, quick=quick).with_workers(workers) for name in names]
     with system_errors(f"The folder {folder} could not be made."):

@@ -16,7 +16,7 @@ from palpate.cli.simulate_commands import simulate_app
 from palpate.cli.table_options import Json
 
 if TYPE_CHECKING:
-    from palpate.runtime.device_search import Finding
+    from palpate.devices.device_search import Finding
 
 __all__ = ["devices_app", "findings_in_words"]
 
@@ -36,7 +36,7 @@ def _default(context: typer.Context, as_json: Json = False) -> None:
 @devices_app.command("list")
 def list_devices(as_json: Json = False) -> None:
     """List the devices that are there, those that were looked for and where, and what to do."""
-    from palpate.runtime.device_search import search
+    from palpate.devices.device_search import search
 
     findings = search()
     text = findings_in_words(findings, explain=True)

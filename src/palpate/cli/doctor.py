@@ -11,8 +11,8 @@ from typing import Any
 
 from palpate.cli.console import Console
 from palpate.cli.device_commands import findings_in_words
+from palpate.devices.device_search import search
 from palpate.errors import DeviceError
-from palpate.runtime.device_search import search
 from palpate.runtime.machine import Check, survey
 from palpate.runtime.timing_test import judge_timing, run_timing_test
 
@@ -28,12 +28,7 @@ _PACKAGES = {"NumPy": "numpy", "Numba": "numba", "NGSolve": "ngsolve"}
 def report(console: Console, seconds: float = 10.0) -> None:
     """Print every finding; a miss that palpate can live without is no failure.
 
-    Parameters
-    ----------
-    console : Console
-        Where it is printed.
-    seconds : float
-        Duration of the timing test, s; 0 leaves it out.
+    The timing test takes `seconds`; 0 leaves it out.
     """
     machine = survey()  # before the test, which is itself a load
     checks = [*_software(), *machine, *_optional()]
@@ -81,7 +76,7 @@ def _timing_lines(timing: dict[str, Any]) -> Iterator[str]:
 
 
 def _software() -> Iterator[Check]:
-    from palpate import __version__
+    from palpate.version import __version__
 
     yield Check("palpate", ok=True, detail=__version__)
     version = platform.python_version()

@@ -17,31 +17,17 @@ from palpate.units import bounds, parse_quantity
 
 __all__ = ["reservations_about", "stroke_of"]
 
-_ROUNDING = 1e-9  # of a depth
-_TRIED = 8  # places
+_ROUNDING = 1e-9  # share of a depth that is round-off
+_TRIED = 8  # deepest places that are tried, at most
 
 
 def stroke_of(body: Surrogate, steps: int, at: str | None = None, depth: float | None = None) -> np.ndarray:
     """Return the inputs (steps, n) of a stroke from just after rest to the deepest place.
 
-    Parameters
-    ----------
-    body : Surrogate
-        The learnt body.
-    steps : int
-        Number of states.
-    at : str, optional
-        x,y,z in m: the place of contact on the surface of a pressed body, where the probe goes in against the normal;
-        the displacement in the end of a held one. By default the middle of what was trained; elsewhere where the middle
-        was not trained.
-    depth : float, optional
-        Largest depth in m; by default the deepest down to which all states are of the trained region.
-
-    Raises
-    ------
-    UsageError
-        If the place is no three numbers or not on the surface, the probe would be let go, or the body's shape follows
-        from loads or from what came before.
+    `at` is x,y,z in m: the place of contact on the surface of a pressed body, where the probe goes in against the
+    normal; the displacement in the end of a held one. By default it is the middle of what was trained, or elsewhere
+    where the middle was not trained. `depth` is the largest depth in m; by default the deepest down to which all states
+    are of the trained region.
     """
     shares = np.arange(1, steps + 1) / steps
     given = None if at is None else _numbers(at)

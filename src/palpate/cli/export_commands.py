@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,8 +15,8 @@ from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
 
 if TYPE_CHECKING:
-    from palpate.export.c_export import ExportedC
-    from palpate.export.check_points import Comparison
+    from palpate.export import ExportedC, ExportedFmu
+    from palpate.export.check_points import ExportedFile
     from palpate.network import Network
     from palpate.surrogates import Surrogate
 
@@ -29,13 +30,20 @@ export_app = typer.Typer(
 LearntFile = Annotated[
     Path, typer.Argument(help="Model file (.palpate), of [bold]palpate learn[/] or [bold]palpate fit[/].")
 ]
+Folder = Annotated[
+    Path | None, typer.Option(help="Folder for the files. Default: the file's name, beside it.")
+]
+OutFile = Annotated[
+    Path | None,
+    typer.Option("-o", "--out", help="File. Default: the model file's name with another ending, beside it."),
+]
 Name = Annotated[str | None, typer.Option(help="Beginning of all names in C. Default: the file's name.")]
 FieldName = Annotated[str | None, typer.Option(help="The field that goes out. Default: the displacement.")]
 NoField = Annotated[bool, typer.Option("--no-field", help="Leave the field out.")]
 NoDeviation = Annotated[
     bool, typer.Option("--no-deviation", help="Leave out how far the force may be off; files become smaller.")
 ]
-NoCheck = Annotated[bool, typer.Option("--no-check", help="Don't compile and compare with palpate.")]
+NoCheck = Annotated[bool, typer.Option("--no-check", help="Don't run it and compare with palpate.")]
 Compiler = Annotated[
     str | None,
     typer.Option(
@@ -43,23 +51,12 @@ Compiler = Annotated[
     ),
 ]
 
-
-_MISSING = {
-    "FMPy": "FMPy is not installed (pip install 'palpate[check]')",
-    "wasmtime": "wasmtime is not installed (pip install 'palpate[check]')",
-    "ONNX Runtime": "ONNX Runtime is not installed (pip install 'palpate[onnx]')",
-}
-"""What is said where an export is not compared, by the program that would run it."""
+_NO_COMPILER = "no C compiler was found"
+_NOT_INSTALLED = "{} is not installed (pip install 'palpate[{}]')"
 
 
 def _read(file: Path) -> Surrogate | Network:
-    """Return the body or the network of a file.
-
-    Raises
-    ------
-    UsageError
-        If it holds neither.
-    """
+    """Return the body or the network of a file."""
     from palpate.learning.loading import load
     from palpate.network import Network
     from palpate.surrogates import Surrogate
@@ -83,6 +80,19 @@ def _name_of(file: Path) -> str:
     return f"model{name}" if name.startswith("_") else name
 
 
+def _body(file: Path) -> Surrogate:
+    from palpate.surrogates import Surrogate
+
+    thing = _read(file)
+    if not isinstance(thing, Surrogate):
+        raise UsageError(
+            f"{file} holds a network alone.",
+            why="This way out is for learnt bodies, which answer a hand.",
+            fix="Take the network out with `palpate export c` or `palpate export onnx`.",
+        )
+    return thing
+
+
 def _say_left_out(console: Console, thing: Surrogate | Network, done: ExportedC, *, no_field: bool) -> None:
     """Say that the shape of a beam did not go out, and why."""
     fields = list(getattr(thing, "fields", ()))
@@ -93,12 +103,27 @@ def _say_left_out(console: Console, thing: Surrogate | Network, done: ExportedC,
         )
 
 
+def _print(
+    console: Console,
+    done: ExportedC | ExportedFmu | ExportedFile,
+    files: Sequence[Path],
+    missing: str,
+    *,
+    no_check: bool,
+    words: str = "",
+) -> None:
+    """Print what was written with its size, and how far it is from palpate or what is `missing` for that."""
+    if done.comparison is None:
+        console.say(f"not compared with palpate: {'not asked for' if no_check else missing}")
+    lines = [f"{file}  {file.stat().st_size / 1e3:.0f} kB{words}" for file in files]
+    lines += [] if done.comparison is None else [str(done.comparison)]
+    console.result("\n".join(lines), done.as_dict())
+
+
 @export_app.command("c")
 def to_c(
     file: LearntFile,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the files. Default: the file's name, beside it.")
-    ] = None,
+    out: Folder = None,
     name: Name = None,
     single: Annotated[bool, typer.Option("--float", help="Numbers of single precision.")] = False,
     field: FieldName = None,
@@ -116,8 +141,7 @@ def to_c(
     """
     from palpate.export import export_c
 
-    thing = _read(file)
-    console = Console(as_json)
+    thing, console = _read(file), Console(as_json)
     done = export_c(
         thing,
         file.with_name(name or file.stem) if out is None else out,
@@ -130,14 +154,8 @@ def to_c(
         compiler=compiler,
         overwrite=force,
     )
-    if done.comparison is None:
-        console.say(
-            "not compared with palpate: " + ("not asked for" if no_check else "no C compiler was found")
-        )
     _say_left_out(console, thing, done, no_field=no_field)
-    lines = [f"{f}  {f.stat().st_size / 1e3:.0f} kB" for f in done.files]
-    lines += [] if done.comparison is None else [str(done.comparison)]
-    console.result("\n".join(lines), done.as_dict())
+    _print(console, done, done.files, _NO_COMPILER, no_check=no_check)
     words = shlex.join(map(str, (done.example, *done.sources)))
     console.say(f"Next: cc -O2 {words} -lm && ./a.out")
 
@@ -145,9 +163,7 @@ def to_c(
 @export_app.command("lib")
 def to_library(
     file: LearntFile,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the files. Default: the file's name, beside it.")
-    ] = None,
+    out: Folder = None,
     name: Name = None,
     field: FieldName = None,
     no_field: NoField = False,
@@ -175,22 +191,16 @@ def to_library(
         compiler=compiler,
         overwrite=force,
     )
-    if done.library is None:
-        console.say("no C compiler was found: build the library with CMake, -DBUILD_SHARED_LIBS=ON")
     _say_left_out(console, thing, done.sources, no_field=no_field)
-    lines = [f"{f}  {f.stat().st_size / 1e3:.0f} kB" for f in done.files]
-    lines += [] if done.comparison is None else [str(done.comparison)]
-    content = replace(done.sources, comparison=done.comparison).as_dict()
-    content["files"] = [{"file": str(f), "bytes": f.stat().st_size} for f in done.files]
-    console.result("\n".join(lines), content)
+    whole = replace(done.sources, files=done.files, comparison=done.comparison)
+    missing = f"{_NO_COMPILER}: build the library with CMake, -DBUILD_SHARED_LIBS=ON"
+    _print(console, whole, done.files, missing, no_check=no_check)
 
 
 @export_app.command("fmu")
 def to_fmu(
     file: LearntFile,
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="File, NAME.fmu. Default: the file's name, beside it.")
-    ] = None,
+    out: OutFile = None,
     name: Name = None,
     fmi: Annotated[
         str, typer.Option("--fmi", help="Version of FMI: 2.0, which most tools import, or 3.0.")
@@ -207,61 +217,32 @@ def to_fmu(
     from palpate.export import export_fmu
 
     thing, console = _body(file), Console(as_json)
-    path = out if out is not None else file.with_name(f"{name or file.stem}.fmu")
     done = export_fmu(
         thing,
-        path,
+        file.with_name(f"{name or file.stem}.fmu") if out is None else out,
         name=name or _name_of(file),
         fmi=fmi,
         deviation=not no_deviation,
         check=not no_check,
         overwrite=force,
     )
-    comparison = done.comparison
-    if comparison is None:
-        console.say("not compared with palpate: " + ("not asked for" if no_check else _MISSING["FMPy"]))
     kinds = "co-simulation and model exchange"
     if not done.exchange and thing.memory is not None:
         kinds = f"co-simulation alone because of the memory {thing.memory.name!r}"
-    lines = [
-        f"{path}  {path.stat().st_size / 1e3:.0f} kB, FMI {done.fmi}, {kinds}, {', '.join(done.platforms)}"
-    ]
-    lines += [] if comparison is None else [str(comparison)]
-    content = {
-        "file": str(path),
-        "hash": done.hash,
-        "fmi": done.fmi,
-        "platforms": list(done.platforms),
-        "exchange": done.exchange,
-    }
-    compared = {} if comparison is None else {k: v.relative for k, v in comparison.parts.items()}
-    console.result("\n".join(lines), content | {"compared": compared or None})
-
-
-def _body(file: Path) -> Surrogate:
-    from palpate.surrogates import Surrogate
-
-    thing = _read(file)
-    if not isinstance(thing, Surrogate):
-        raise UsageError(
-            f"{file} holds a network alone.",
-            why="This way out is for learnt bodies, which answer a hand.",
-            fix="Take the network out with `palpate export c` or `palpate export onnx`.",
-        )
-    return thing
+    words = f", FMI {done.fmi}, {kinds}, {', '.join(done.platforms)}"
+    missing = _NOT_INSTALLED.format("FMPy", "check")
+    _print(console, done, [done.path], missing, no_check=no_check, words=words)
 
 
 @export_app.command("onnx")
 def to_onnx(
     file: LearntFile,
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="File, NAME.onnx. Default: the file's name, beside it.")
-    ] = None,
+    out: OutFile = None,
     single: Annotated[
         bool, typer.Option("--float", help="Numbers of 32 bits, which browsers' runtimes take.")
     ] = False,
     elastic: Annotated[bool, typer.Option("--elastic", help="Leave a memory out.")] = False,
-    no_check: Annotated[bool, typer.Option("--no-check", help="Don't compare with palpate.")] = False,
+    no_check: NoCheck = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -274,7 +255,8 @@ def to_onnx(
     console = Console(as_json)
     path = file.with_suffix(".onnx") if out is None else out
     done = export_onnx(_read(file), path, single=single, elastic=elastic, check=not no_check, overwrite=force)
-    _tell(console, done.file, done.hash, done.comparison, "ONNX Runtime", no_check=no_check)
+    missing = _NOT_INSTALLED.format("ONNX Runtime", "onnx")
+    _print(console, done, [done.file], missing, no_check=no_check)
 
 
 @export_app.command("html")
@@ -284,7 +266,7 @@ def to_html(
         Path | None,
         typer.Option("-o", "--out", help="File. Default: NAME-page.html beside the file NAME.palpate."),
     ] = None,
-    no_check: Annotated[bool, typer.Option("--no-check", help="Don't compare with palpate.")] = False,
+    no_check: NoCheck = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -297,20 +279,5 @@ def to_html(
     done = export_html(thing, path, check=not no_check, overwrite=force)
     if done.left_out:
         console.say(f"not in the file: {', '.join(done.left_out)} (5 MB are full, or it is on other nodes)")
-    _tell(console, done.file, done.hash, done.comparison, "wasmtime", no_check=no_check)
-
-
-def _tell(
-    console: Console, file: Path, sha256: str, comparison: Comparison | None, runtime: str, *, no_check: bool
-) -> None:
-    """Print what was written, and how far it is from palpate."""
-    if comparison is None:
-        console.say("not compared with palpate: " + ("not asked for" if no_check else _MISSING[runtime]))
-    lines = [f"{file}  {file.stat().st_size / 1e6:.2f} MB"]
-    lines += [] if comparison is None else [str(comparison)]
-    parts = {} if comparison is None else comparison.parts
-    compared = {k: {"relative": v.relative, "allowed": v.allowed} for k, v in parts.items()}
-    console.result(
-        "\n".join(lines),
-        {"file": str(file), "bytes": file.stat().st_size, "sha256": sha256, "compared": compared},
-    )
+    missing = _NOT_INSTALLED.format("wasmtime", "check")
+    _print(console, done, [done.file], missing, no_check=no_check)

@@ -22,19 +22,11 @@ __all__ = ["Columns", "fit_table"]
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns of a table to learn from.
-
-    Attributes
-    ----------
-    inputs, outputs : sequences of str
-        Names, or several with commas between them.
-    missing : str
-        "leave-out" or "refuse" rows in which a value is missing.
-    """
+    """Columns of a table to learn from; each text is a name, or several with commas between them."""
 
     inputs: Sequence[str]
     outputs: Sequence[str]
-    missing: str = "leave-out"
+    missing: str = "leave-out"  # "leave-out" or "refuse" rows in which a value is missing
 
 
 def fit_table(
@@ -49,29 +41,8 @@ def fit_table(
 ) -> None:
     """Learn a network from a table and write it; a summary goes to stdout.
 
-    Parameters
-    ----------
-    path : Path
-        The table.
-    columns : Columns
-        What is learnt from what.
-    out : Path, optional
-        File for the model; by default the table's name with the ending .palpate.
-    console : Console
-        Takes progress and results.
-    reading : mapping
-        How the table is written, as `palpate.tables.read_table` takes it.
-    force : bool
-        True to replace a file that exists.
-    **search
-        Of `palpate.fit`.
-
-    Raises
-    ------
-    FileFormatError
-        If the table can't be read.
-    UsageError
-        If a column is missing, or there is nothing to learn from.
+    The model is by default the table's name with the ending .palpate; `force` replaces a file that exists. `reading` is
+    how the table is written, as `palpate.tables.read_table` takes it; `search` are options of `palpate.fit`.
     """
     out = path.with_suffix(".palpate") if out is None else out
     if out.exists() and not force:

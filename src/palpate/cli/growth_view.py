@@ -29,21 +29,14 @@ WIDTH, HEIGHT = 60, 12  # characters of the map
 EVERY = 0.1  # s between pictures
 BLOCKS = "▁▂▃▄▅▆▇█"
 GREW, VANISHED, UNIT, SAMPLE = "◉", "×", "●", "·"
-NAMES = 18
+NAMES = 18  # characters of the column of names
 
 
 @contextlib.contextmanager
 def watch_growth(page: Path | None, name: str, console: Console) -> Iterator[GrowthRecorder | None]:
     """Yield a recorder whose growth is shown in a terminal, and written as a page in the end; None without a page.
 
-    Parameters
-    ----------
-    page : Path or None
-        File of the page.
-    name : str
-        Name of the body, for headings.
-    console : Console
-        Printer; with JSON as its output nothing is shown.
+    The name is that of the body, for headings; a console whose output is JSON shows nothing.
     """
     if page is None:
         yield None
@@ -100,15 +93,7 @@ def _picture(growth: GrowthRecorder, name: str) -> Group:
 
 
 def growth_lines(growth: GrowthRecorder, name: str) -> list[str]:
-    """Return the picture of the growth so far as lines of text.
-
-    Parameters
-    ----------
-    growth : GrowthRecorder
-        What was recorded.
-    name : str
-        Name of the body.
-    """
+    """Return the picture of the growth so far as lines of text."""
     done, units = len(growth.errors), growth.counts[-1] if growth.counts else 0
     grown = sum(frame.grew is not None for frame in growth.frames)
     pruned = sum(len(frame.vanished) for frame in growth.frames)

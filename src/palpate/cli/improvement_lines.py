@@ -31,31 +31,11 @@ def improve_file(
     *,
     case_limit: float,
 ) -> None:
-    """Choose the solves of a study file until a force error is kept, and print where everything is.
+    """Choose the solves of a study file until a force error, such as "2%", is kept, and print where everything is.
 
-    Parameters
-    ----------
-    file : Path
-        Study file.
-    until : str
-        Wanted force error, such as "2%".
-    minutes : float, optional
-        Limit on time; by default none.
-    samples : int, optional
-        Most solves to learn from.
-    workers : int, optional
-        Processes of this machine; by default those of the study.
-    scheduler : Scheduler, optional
-        Running scheduler to solve on instead.
-    console : Console
-        Printer of the lines.
-    case_limit : float
-        Time in s after which a single solve has failed.
-
-    Raises
-    ------
-    AccuracyError
-        If the force error was not reached; everything has been kept and printed then.
+    `samples` are at most learnt from; a single solve has failed after `case_limit` seconds. It is solved on the
+    scheduler, else on so many workers of this machine, by default those of the study. An `AccuracyError`, if the error
+    was not reached, comes after everything has been kept and printed.
     """
     from palpate.study import read_study
     from palpate.study.run import Paths
@@ -84,31 +64,11 @@ def improve_file(
 def improve_and_print(
     study: Study, paths: Paths, until: float, limit: float, console: Console, **options: Any
 ) -> tuple[Outcome, dict[str, Any], AccuracyError | None]:
-    """Improve a study and print a line for each surrogate.
+    """Improve a study of a body under a probe, and print a line for each surrogate.
 
-    Parameters
-    ----------
-    study : Study
-        A study of a body under a probe.
-    paths : Paths
-        Its files.
-    until : float
-        Wanted relative force error.
-    limit : float
-        Time in s after which no further batch begins.
-    console : Console
-        Printer of the lines.
-    **options
-        Further ones of `palpate.study.improve_study.improve_study`.
-
-    Returns
-    -------
-    outcome : Outcome
-        The study with its last surrogate.
-    content : dict
-        The steps and the files, for JSON.
-    failure : AccuracyError or None
-        What to raise where the wanted error was not reached.
+    `until` is the wanted relative force error, `limit` the time in s after which no further batch begins; the options
+    are further ones of `improve_study`. Returned are the study with its last surrogate, the steps and files for JSON,
+    and the error to raise where the wanted one was not reached.
     """
     from palpate.study.improve_study import conclude, improve_study
 
@@ -156,13 +116,7 @@ def _failure(study: Study, until: float, last: ImprovementStep) -> AccuracyError
 
 
 def share_of(text: str) -> float:
-    """Return a share: of "2%" 0.02.
-
-    Raises
-    ------
-    UsageError
-        If the text is no share between 0 and 1.
-    """
+    """Return a share: of "2%" 0.02."""
     value = parse_quantity(text, "", "--until")
     if 0 < value < 1:
         return value

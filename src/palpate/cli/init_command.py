@@ -22,27 +22,9 @@ def init_study(
 ) -> None:
     """Write or print a study, or write the sample part.
 
-    Parameters
-    ----------
-    path : Path
-        File to write, or a part, whose study is written beside it.
-    preset : str
-        Named study to start from, for a path that is no part.
-    unit : str, optional
-        Unit of a part's file.
-    default : bool
-        Whether the path is the default one, which gives the study no name.
-    sample : bool
-        Whether to write the sample part to the path.
-    force : bool
-        Whether to replace a file that palpate wrote.
-    show : bool
-        Whether to print the study instead.
-
-    Raises
-    ------
-    UsageError
-        If the file exists and is not to be replaced, is a folder, or can't be read as a part.
+    The path is the file to write, or a part in `unit`, whose study is written beside it; a preset is the named study to
+    start from where it is no part. A default path gives the study no name. `force` replaces a file that palpate wrote,
+    `show` prints the study instead.
     """
     if path.is_dir():
         raise UsageError(f"{path} is a folder.", fix="Name the file of a part, or of a study, NAME.toml.")

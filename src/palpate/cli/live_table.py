@@ -17,16 +17,9 @@ __all__ = ["live_rows", "live_table"]
 
 
 def live_rows(state: State, *, holds: bool, keys: bool = False) -> tuple[tuple[str, str], ...]:
-    """Return the table's rows: a name, and figures in words.
+    """Return the table's rows for the newest tick: a name, and figures in words.
 
-    Parameters
-    ----------
-    state : State
-        The newest tick.
-    holds : bool
-        Whether the device holds the body, and doesn't press it.
-    keys : bool
-        Whether keys of the terminal are heard.
+    `holds` tells that the device holds the body, and doesn't press it; `keys` that keys of the terminal are heard.
     """
     rows = [
         ("loop", _loop(state)),

@@ -141,23 +141,8 @@ def fit_material(
 ) -> None:
     """Fit what the tables hold, print it, and write a picture and a study's table.
 
-    Parameters
-    ----------
-    tables : SpecimenTables
-        The files.
-    options : mapping
-        Law, Poisson's ratio, weight and margin; of a relaxation begin of the hold, time of the rise and preload.
-    sizes : mapping
-        Radius, thickness and width of an indentation, as text with units.
-    plot, out : Path, optional
-        Files of the picture and of the table.
-    console : Console
-        Printer of the result.
-
-    Raises
-    ------
-    UsageError
-        If the files, their columns or the options can't be fitted.
+    The options are law, Poisson's ratio, weight and margin, and of a relaxation begin of the hold, time of the rise and
+    preload; the sizes are radius, thickness and width of an indentation, as text with units.
     """
     from palpate.files import write_file
 

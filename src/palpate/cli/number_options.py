@@ -19,18 +19,10 @@ __all__ = ["count_option", "number_option"]
 def number_option(
     name: str, unit: str = "", *, least: float | None = None, most: float | None = None, help: str
 ) -> Any:
-    """Return the declaration of an option that is a number, in its unit or with another.
+    """Return the declaration of an option, such as "--seconds", that is a number, in its unit or with another.
 
-    Parameters
-    ----------
-    name : str
-        For example "--seconds".
-    unit : str
-        SI unit of a number that stands alone; "" for a pure number.
-    least, most : float, optional
-        Ends of the range that is allowed; none by default.
-    help : str
-        Text of the help.
+    A number that stands alone is in the SI unit `unit`, "" for a pure number. `least` and `most` are the ends of the
+    range that is allowed.
     """
 
     def read(text: str) -> float:

@@ -13,9 +13,9 @@ from pathlib import Path
 from palpate.cli.console import Console
 from palpate.cli.live_table import live_table
 from palpate.cli.terminal_keys import RESUME, STOP, Keys, terminal_keys
+from palpate.devices import device_traits
 from palpate.format import share
 from palpate.runtime import LoopProcess
-from palpate.runtime.devices import device_traits
 from palpate.runtime.shared_state import State
 from palpate.runtime.touchable import Touchable, load_touchable
 from palpate.surrogates.surrogate import correction_warning
@@ -83,33 +83,12 @@ def run_loop(
     dead_man: bool = False,
     record: Path | None = None,
 ) -> None:
-    """Run a model's loop for a while and print its report.
+    """Run a model's loop for a while, in s, and print its report.
 
-    Parameters
-    ----------
-    model : Path
-        File of a learnt body that can be touched.
-    seconds : float
-        Duration, s.
-    device : str
-        Name of the device, and its options after a colon.
-    rate : float, optional
-        Ticks per second, Hz; by default the body's own, or 1000.
-    console : Console
-        Takes what is said.
-    unsoftened : bool
-        Whether a body that is too stiff for the device shall feel so all the same.
-    controller : bool
-        Whether the passivity controller may damp.
-    dead_man : bool
-        Whether the force acts only while the device's first button is held.
-    record : Path, optional
-        New file that takes every tick.
-
-    Raises
-    ------
-    ResourceError
-        If the recording stopped by itself; the loop has run on, and its report is printed.
+    The device is its name, with its options after a colon; the rate (Hz) is by default the body's own, or 1000.
+    `unsoftened` lets a body that is too stiff for the device feel so all the same, `controller` lets the passivity
+    controller damp, and with `dead_man` the force acts only while the device's first button is held. `record` is a new
+    file that takes every tick; if it stops by itself the loop runs on, and a `ResourceError` follows the report.
     """
     touch = load_touchable(model)
     settings = touch.meta.get("runtime", {})
@@ -162,13 +141,7 @@ def _recording(loop: LoopProcess) -> tuple[str, dict[str, object]]:
 
 
 def aim_device(device: str, touch: Touchable) -> str:
-    """Return the device; a scripted stroke without a place presses where the body was trained to be pressed.
-
-    Raises
-    ------
-    UsageError
-        If there is no device of that name.
-    """
+    """Return the device; a scripted stroke without a place presses where the body was trained to be pressed."""
     name, _, text = device.partition(":")
     scale = touch.workspace(device_traits(device).radius).scale
     if name not in {"stroke", "simulated"} or touch.holds:

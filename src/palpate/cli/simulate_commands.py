@@ -84,8 +84,8 @@ def haply(
     as_json: Json = False,
 ) -> None:
     """Run a double of the Haply Inverse Service, until Ctrl-C."""
-    from palpate.runtime.devices.haply_simulator import HaplySimulator, SimulatorSettings
-    from palpate.runtime.devices.profiles import PROFILES, weakest_profile
+    from palpate.devices.doubles.haply_simulator import HaplySimulator, SimulatorSettings
+    from palpate.devices.profiles import PROFILES, weakest_profile
 
     settings = SimulatorSettings(
         port=port,
@@ -124,8 +124,8 @@ def crtk(
     as_json: Json = False,
 ) -> None:
     """Run a double of a CRTK arm behind a ROS bridge, until Ctrl-C."""
-    from palpate.runtime.devices.crtk_settings import CrtkSettings
-    from palpate.runtime.devices.crtk_simulator import CrtkSimulator, CrtkSimulatorSettings
+    from palpate.devices.crtk_settings import CrtkSettings
+    from palpate.devices.doubles.crtk_simulator import CrtkSimulator, CrtkSimulatorSettings
 
     settings = CrtkSimulatorSettings(
         port=port,
@@ -163,9 +163,9 @@ def forcedimension(
     as_json: Json = False,
 ) -> None:
     """Compile a double of Force Dimension's library, with a device behind it."""
+    from palpate.devices.force_dimension import TYPES
+    from palpate.devices.profiles import device_profile
     from palpate.errors import UsageError
-    from palpate.runtime.devices.force_dimension import TYPES
-    from palpate.runtime.devices.profiles import device_profile
 
     numbers = {name: number for number, name in reversed(TYPES.items())}
     if kind not in numbers:
@@ -236,7 +236,7 @@ def _listen(words: str, device: str, seconds: float, as_json: bool) -> Console:
 
 def _compile(device: str, folder: Path, definitions: dict[str, float], as_json: bool) -> None:
     """Compile the double of a library and say how it is used."""
-    from palpate.runtime.device_doubles import compile_double
+    from palpate.devices.doubles.library_doubles import compile_double
 
     library = compile_double(device, folder, {name: float(value) for name, value in definitions.items()})
     use = f"{device}:library={library}"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["KINDS", "SpecimenTables"]
 
 KINDS = ("uniaxial", "equibiaxial", "planar", "indentation", "relaxation")
-_SIDES = ("tension", "compression")  # of a uniaxial test, for --test too
+_SIDES = ("tension", "compression")  # sides of a uniaxial test, for --test too
 _WORDS = {
     "equibiaxial": ("equibiaxial", "biaxial", "bulge", "inflation"),
     "planar": ("planar", "pure shear", "pure_shear", "pure-shear", "pureshear"),
@@ -42,42 +42,24 @@ _UNITS = {
 _UNITS |= dict.fromkeys(("stretch", "strain", "log strain"), "")
 """What a column can hold, with its SI unit."""
 _PERCENT = 3.0  # strain without a unit, above which it may be in per cent
-_STRAY = 0.1  # of the largest value: values of the other sign that are noise
+_STRAY = 0.1  # share of the largest value, up to which values of the other sign are noise
 
 
 @dataclass(frozen=True)
 class SpecimenTables:
-    """Files of tests, and what was said of them.
-
-    Attributes
-    ----------
-    files : list of Path
-        The tables.
-    kinds : list of str
-        Kinds of their tests, in their order; empty where the files' names tell them.
-    measure : str or None
-        Measure of stress, where columns don't tell it.
-    columns : list of str
-        Words WHAT=NAME.
-    options : mapping
-        Options of `palpate.tables.read_table`.
-    heights, areas : list of float
-        Undeformed length in m and section in m² of the specimens, one for all files or one for each; empty where the
-        tables have strain and stress.
-    cycle : str or None
-        Which cycle of loads is taken; None takes the first loading.
-    notes : list of str
-        Sentences on what was left out or taken for something, which reading adds to.
-    """
+    """Files of tests, and what was said of them."""
 
     files: list[Path]
-    kinds: list[str]
-    measure: str | None
-    columns: list[str]
-    options: Any = field(default_factory=dict)
+    kinds: list[str]  # of the tests, in their order; empty where the files' names tell them
+    measure: str | None  # of stress, where columns don't tell it
+    columns: list[str]  # words WHAT=NAME
+    options: Any = field(default_factory=dict)  # of `palpate.tables.read_table`
+    # undeformed lengths in m, one for all files or one for each; empty where the tables have strain
     heights: list[float] = field(default_factory=list)
+    # undeformed sections in m², likewise; empty where the tables have stress
     areas: list[float] = field(default_factory=list)
-    cycle: str | None = None
+    cycle: str | None = None  # which cycle of loads is taken; None takes the first loading
+    # sentences on what was left out or taken for something, which reading adds to
     notes: list[str] = field(default_factory=list)
 
     def kind(self, i: int) -> str:
@@ -86,13 +68,7 @@ class SpecimenTables:
         return "uniaxial" if stated in _SIDES else stated
 
     def _stated(self, i: int) -> str:
-        """Return the kind of a test as it is said, or as the file's name says it; tension and compression are kinds.
-
-        Raises
-        ------
-        UsageError
-            If neither says it.
-        """
+        """Return the kind of a test as it is said, or as the file's name says it; tension and compression are kinds."""
         if self.kinds:
             if len(self.kinds) != len(self.files) or not set(self.kinds) <= {*KINDS, *_SIDES}:
                 raise UsageError(
@@ -205,10 +181,7 @@ class SpecimenTables:
     def _column(self, table: Table, *wanted: str, more: str = "") -> tuple[str, Column]:
         """Return what a column holds, and the column: that of --column, else of the first of `wanted` there is.
 
-        Raises
-        ------
-        UsageError
-            If there is none, or more than one, or a word is no WHAT=NAME.
+        The words of --column are WHAT=NAME.
         """
         given = {}
         for word in self.columns:

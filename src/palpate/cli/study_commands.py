@@ -50,20 +50,8 @@ def sweep_file(
 ) -> None:
     """Solve what a study file describes, here or on a scheduler, and print where the solves are.
 
-    Parameters
-    ----------
-    study : Path
-        Study file.
-    workers : int, optional
-        Processes of this machine; by default those of the study.
-    console : Console
-        Printer of the result.
-    scheduler : Scheduler, optional
-        Running scheduler to solve on instead.
-    case_limit : float
-        Time in s after which a single solve has failed.
-    samples : int, optional
-        Solves to learn from, in place of the study's own number; a finished sweep is continued.
+    The workers are by default those of the study; a single solve has failed after `case_limit` seconds. `samples` go in
+    place of the study's own number; a finished sweep is continued.
     """
     from palpate.dataset import Dataset
     from palpate.study import read_study
@@ -113,23 +101,9 @@ def sweep_file(
 
 
 def learn_path(study: Path, effort: float | None, console: Console, *, watch: bool) -> None:
-    """Learn a study file, or a dataset.
+    """Learn a study file, or a dataset, a folder ``NAME.zarr``.
 
-    Parameters
-    ----------
-    study : Path
-        Study file, or a folder ``NAME.zarr``.
-    effort : float or None
-        Work of the search, of a dataset.
-    console : Console
-        Printer of the result.
-    watch : bool
-        Whether to show the growth of a study's sequential filter.
-
-    Raises
-    ------
-    UsageError
-        If an option is of the other kind.
+    The effort is of a dataset's search; `watch` shows the growth of a study's sequential filter.
     """
     if not study.is_dir():
         if effort is not None:
@@ -144,25 +118,11 @@ def learn_path(study: Path, effort: float | None, console: Console, *, watch: bo
 def learn_file(study: Path, console: Console, *, watch: bool = False) -> None:
     """Learn the dataset of a study file, judge the result, write it and print how good it is.
 
-    Parameters
-    ----------
-    study : Path
-        Study file.
-    console : Console
-        Printer of the result.
-    watch : bool
-        Whether to show the growth of the sequential filter, and to write the page that plays it.
+    `watch` shows the growth of the sequential filter, and writes the page that plays it.
     """
     from palpate.cli.growth_view import watch_growth
     from palpate.study import read_study
-    from palpate.study.run import (
-        Paths,
-        learn_study,
-        load_data,
-        save_model,
-        validate_study,
-        with_validation,
-    )
+    from palpate.study.run import Paths, learn_study, load_data, save_model, validate_study, with_validation
     from palpate.study.study_advice import earlier_curve
 
     with console.patience(f"Reading {study}"):
@@ -196,21 +156,8 @@ _HEADLINES = {"rmse", "filter_rmse", "force_median", "force_p95", "history_force
 def validate_study_file(study: Path, report: bool, console: Console, traces: Sequence[Path] = ()) -> None:
     """Judge the model of a study file by its unseen solves, print, and write the report.
 
-    Parameters
-    ----------
-    study : Path
-        Study file, whose model is learnt.
-    report : bool
-        Whether to write the report.
-    console : Console
-        Printer of the result.
-    traces : sequence of Path
-        Recorded touches, beside which the full model is solved for the report.
-
-    Raises
-    ------
-    AccuracyError
-        If a limit is missed; everything has been printed and written then.
+    Beside the recorded touches of `traces` the full model is solved for the report. Of a missed limit an
+    `AccuracyError` tells after everything has been printed and written.
     """
     from palpate.study import read_study
     from palpate.study.run import Outcome, Paths, load_data, load_model, report_study, validate_study
@@ -248,7 +195,7 @@ def validate_study_file(study: Path, report: bool, console: Console, traces: Seq
 def _beside_full_model(record: Study, traces: Sequence[Path], console: Console) -> list[TouchComparison]:
     if not traces:
         return []
-    from palpate.runtime.trace_file import read_trace
+    from palpate.devices.trace_file import read_trace
     from palpate.validation.full_model import compare_full_model
 
     problem = record.problem(whole=True)
@@ -260,16 +207,9 @@ def _beside_full_model(record: Study, traces: Sequence[Path], console: Console) 
 
 
 def learn_dataset_file(path: Path, effort: float, console: Console) -> None:
-    """Learn a dataset on its own, write the model beside it, and print how it was learnt.
+    """Learn a dataset, a folder ``NAME.zarr``, write the model beside it, and print how it was learnt.
 
-    Parameters
-    ----------
-    path : Path
-        Dataset, a folder ``NAME.zarr``.
-    effort : float
-        Multiplies the counts of candidates and iterations of the searches.
-    console : Console
-        Printer of the result.
+    The effort multiplies the counts of candidates and iterations of the searches.
     """
     from palpate.dataset import Dataset
     from palpate.learning import learn_dataset
@@ -301,23 +241,8 @@ def validate_model(
 ) -> None:
     """Judge a learnt file by unseen solves, print, and write the report beside the file.
 
-    Parameters
-    ----------
-    path : Path
-        Of the model.
-    test, refined : Path, optional
-        Unseen solves or load histories, and solves on a finer mesh; by default the test set beside the file.
-    report : bool
-        Whether to write the report.
-    console : Console
-        Printer of the result.
-
-    Raises
-    ------
-    UsageError
-        If there is no test set, or it is of another body.
-    AccuracyError
-        If a limit is missed; everything has been printed and written then.
+    `test` are unseen solves or load histories, by default the test set beside the file; `refined` are solves on a finer
+    mesh. Of a missed limit an `AccuracyError` tells after everything has been printed and written.
     """
     from palpate.dataset import Dataset
     from palpate.surrogates import Surrogate

@@ -52,13 +52,7 @@ def _reading_options(
         typer.Option(help="Unit of a column, NAME=UNIT, such as x=mm. Can be given several times."),
     ] = None,
 ) -> dict[str, Any]:
-    """Return the options of `palpate.tables.read_table`, from those of a command.
-
-    Raises
-    ------
-    UsageError
-        If a unit is not NAME=UNIT.
-    """
+    """Return the options of `palpate.tables.read_table`, from those of a command."""
     units = {}
     for text in unit or ():
         name, mark, value = text.rpartition("=")
@@ -80,10 +74,7 @@ def _reading_options(
 def with_table_options(command: Callable[..., None]) -> Callable[..., None]:
     """Return a command that has the options of how a table is written in place of its parameter `reading`.
 
-    Parameters
-    ----------
-    command : callable
-        Takes, among its other arguments, `reading`: the options of `palpate.tables.read_table` that were given.
+    `reading` gets the options of `palpate.tables.read_table` that were given.
     """
     options = inspect.signature(_reading_options, eval_str=True).parameters
     own = inspect.signature(command, eval_str=True).parameters.values()

@@ -15,12 +15,9 @@ _MEANINGS = {0x1B: STOP, 0x20: STOP, ord("r"): RESUME, ord("R"): RESUME}
 
 
 class Keys:
-    """The keys pressed since the last look.
+    """The keys pressed since the last look at a terminal in which each key arrives by itself.
 
-    Parameters
-    ----------
-    descriptor : int
-        File descriptor of a terminal in which each key arrives by itself; -1 for none.
+    Its file descriptor is -1 where there is none.
     """
 
     def __init__(self, descriptor: int = -1) -> None:
@@ -43,10 +40,7 @@ class Keys:
 def terminal_keys(descriptor: int | None = None) -> Iterator[Keys]:
     """Read single keys of a terminal while the context lasts; none where there is no terminal that can do so.
 
-    Parameters
-    ----------
-    descriptor : int, optional
-        Of the terminal; standard input by default.
+    The file descriptor is by default that of standard input.
     """
     if descriptor is None:
         try:

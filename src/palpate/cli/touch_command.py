@@ -216,13 +216,7 @@ def _chosen(study: Study) -> str:
 
 
 def _carry_on(study: Study, paths: Paths, until: float, limit: float, console: Console) -> None:
-    """Improve the study, print each surrogate, and write the report of the last.
-
-    Raises
-    ------
-    AccuracyError
-        If the force error was not reached.
-    """
+    """Improve the study, print each surrogate, and write the report of the last."""
     from palpate.cli.improvement_lines import improve_and_print
     from palpate.study.run import report_study
 

@@ -74,26 +74,11 @@ class _Work:
 class TouchedPart:
     """One part on its page: what a person chooses, the work, and the surrogates that come of it.
 
-    Parameters
-    ----------
-    until : float
-        Wanted relative force error.
-    limit : float
-        Time in s after which no further batch of solves begins.
-    workers : int, optional
-        Processes that solve.
-    console : Console
-        Printer of the lines.
-
-    Attributes
-    ----------
-    page : PartPage
-        To be set before `begin`.
-    times : dict of str to float
-        Time in s from the making of this object to ``page``, ``start``, ``touch`` and ``end``.
+    `until` is the wanted relative force error, `limit` the time in s after which no further batch of solves begins.
+    `times` are those in s from the making of this object to ``page``, ``start``, ``touch`` and ``end``.
     """
 
-    page: PartPage
+    page: PartPage  # to be set before `begin`
 
     def __init__(self, until: float, limit: float, workers: int | None, console: Console) -> None:
         self.until, self.limit, self.workers, self.console = until, limit, workers, console
@@ -111,17 +96,10 @@ class TouchedPart:
             self.times[name] = time.monotonic() - self._made
 
     def begin(self, file_of: Callable[[], Path]) -> None:
-        """Let the work on a study file begin, and return at once.
+        """Let the work on a study file begin, and return at once; a second time is refused.
 
-        Parameters
-        ----------
-        file_of : callable
-            Writes the study where that is to be done, and returns its file. Where it fails nothing has begun.
-
-        Raises
-        ------
-        UsageError
-            If the work has begun before; then nothing is written.
+        Nothing is written then. `file_of` writes the study where that is to be done, and returns its file. Where it
+        fails nothing has begun.
         """
         with self._beginning:
             if self._begun:
@@ -245,29 +223,11 @@ def touch_on_page(
 ) -> None:
     """Open the page of a part, let a person choose, and work until Ctrl-C.
 
-    Parameters
-    ----------
-    name : str
-        Title of the page.
-    study_of : callable
-        Gets a unit of the file's numbers, or None at first; returns the study of the part, its file, and whether that
-        was there before: then the work goes on at once.
-    write : callable
-        Writes a chosen study, and returns its file.
-    touched : TouchedPart
-        The part and its work.
-    at_once : bool
-        Whether to begin with the first choices.
-    on_ready : callable, optional
-        Called once with the running page; by default its address is printed, and opened in the user's browser where
-        there is a terminal.
-    **options
-        Those of `palpate.viewer.part_page.PartPage`.
-
-    Raises
-    ------
-    PalpateError
-        If the part can't be read.
+    `study_of` gets a unit of the file's numbers, or None at first; it returns the study of the part, its file, and
+    whether that was there before: then the work goes on at once, as with `at_once`, which begins with the first
+    choices. `write` writes a chosen study and returns its file. `on_ready` is called once with the running page; by
+    default its address is printed, and opened in the user's browser where there is a terminal. The options are those of
+    `PartPage`.
     """
     from palpate.study.part_choices import chosen_study, shown_part
 

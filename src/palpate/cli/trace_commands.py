@@ -17,7 +17,7 @@ from palpate.output_files import require_outputs
 if TYPE_CHECKING:
     import numpy as np
 
-    from palpate.runtime.trace_file import Trace
+    from palpate.devices.trace_file import Trace
     from palpate.validation.report.trace_pictures import Solved
     from palpate.validation.touch_comparison import TouchComparison
 
@@ -86,7 +86,7 @@ def _show(model: Path, file: Path, console: Console) -> None:
 
 
 def _read(file: Path, console: Console) -> Trace:
-    from palpate.runtime.trace_file import read_trace
+    from palpate.devices.trace_file import read_trace
 
     trace = read_trace(file)
     for note in trace.notes:
@@ -95,13 +95,7 @@ def _read(file: Path, console: Console) -> Trace:
 
 
 def _model_of(trace: Trace) -> Path:
-    """Return the file of the recorded model, by its checksum where it was and beside the trace.
-
-    Raises
-    ------
-    UsageError
-        If it isn't there.
-    """
+    """Return the file of the recorded model, by its checksum where it was and beside the trace."""
     from palpate.runtime.replay import is_recorded_model
 
     known = trace.header.get("model", {})

@@ -149,7 +149,13 @@ class Dataset:
         return Dataset(self.data.isel(sample=rows))
 
     def every(self, k: int, start: int = 0) -> Dataset:
-        """Return each k-th row, beginning with row `start`."""
+        """Return each k-th row, beginning with row `start`.
+
+        Raises
+        ------
+        UsageError
+            If `k` is below 1 or `start` below 0.
+        """
         if k < 1 or start < 0:
             raise UsageError(
                 f"Rows cannot be taken every {k} from {start}.",

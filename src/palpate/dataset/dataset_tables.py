@@ -36,20 +36,7 @@ _FIELD_DIMS = ("node", "component")
 def write_table(data: Dataset, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Write the solves of a dataset to a file; its ending decides the format: .csv, .parquet or .nc.
 
-    Parameters
-    ----------
-    data : Dataset
-        The dataset; rows that did not converge are written too, with their reason in `message`.
-    path : path
-        File to write.
-    overwrite : bool
-        True replaces a file that exists.
-
-    Raises
-    ------
-    UsageError
-        For another ending, for a file that exists, or where Parquet files can't be written since pyarrow is not
-        installed.
+    Rows that did not converge are written too, with their reason in `message`. Parquet files need pyarrow.
     """
     target = Path(path)
     ending = target.suffix.lower()
@@ -88,19 +75,7 @@ def columns_of(data: Dataset) -> list[tuple[str, str, np.ndarray]]:
 def write_fields_csv(data: Dataset, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Write the fields over the nodes as CSV: a row for each node of each solve that converged.
 
-    Parameters
-    ----------
-    data : Dataset
-        The dataset.
-    path : path
-        File to write, such as ``NAME-fields.csv``.
-    overwrite : bool
-        True replaces a file that exists.
-
-    Raises
-    ------
-    UsageError
-        If the dataset has no fields, or the file exists.
+    The path is such as ``NAME-fields.csv``.
     """
     require_outputs([path], endings=(".csv",), overwrite=overwrite)
     fields = [

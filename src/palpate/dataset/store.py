@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["fingerprint", "read", "write"]
 
-CHUNK_BYTES = 4_000_000  # some 50 samples of 3,000 nodes; a file each
-_PROVENANCE = "provenance"  # its checksum stands beside those of the arrays
+CHUNK_BYTES = 4_000_000  # bytes of a chunk, which is a file: some 50 samples of 3,000 nodes
+_PROVENANCE = "provenance"  # attribute whose checksum stands beside those of the arrays
 _CHUNK_ROWS, _CHUNKS = 64, 8  # rows at least in a chunk of a small array, and chunks that it has about
 
 
@@ -186,10 +186,7 @@ def _sound_rows(
 ) -> xarray.Dataset:
     """Return the rows that no damage has reached, with a warning.
 
-    Raises
-    ------
-    ValueError
-        If something else than rows is damaged, or no row is left.
+    A `ValueError` says that something else than rows is damaged, or that no row is left.
     """
     stated = {name: text for name, text in checksums.items() if name != _PROVENANCE}
     first = next((str(fault) for found in faults.values() for fault in found), "")

@@ -27,33 +27,19 @@ __all__ = ["ChunkFault", "chunk_faults", "missing_chunks", "unreadable_chunks"]
 
 _LONGEST_TEXT = 1 << 16  # bytes of a single text, such as a message with its traceback
 _TEXT_HEAD = 4  # bytes before each text, and before all of them
-_MOST_TEXT, _TEXT_RATIO = (
-    250_000_000,
-    1000,
-)  # bytes that a chunk of texts may hold, and more for each byte stored
+# bytes that a chunk of texts may hold, and more for each byte stored
+_MOST_TEXT, _TEXT_RATIO = 250_000_000, 1000
 _CRC = 4  # bytes of the checksum behind a chunk
 
 
 @dataclass(frozen=True)
 class ChunkFault:
-    """A fault of one chunk.
+    """A fault of one chunk."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the array.
-    key : str
-        Name of the chunk in it, such as ``c/0/0``.
-    reason : str
-        What is wrong.
-    rows : slice
-        Its rows: the range that it has of the array's first dimension.
-    """
-
-    name: str
-    key: str
-    reason: str
-    rows: slice
+    name: str  # of the array
+    key: str  # name of the chunk in it, such as ``c/0/0``
+    reason: str  # what is wrong
+    rows: slice  # its range of the array's first dimension
 
     def __str__(self) -> str:
         return f"{self.name}, chunk {self.key}: {self.reason}"
@@ -87,15 +73,9 @@ class _Array:
 def chunk_faults(path: Path) -> dict[str, list[ChunkFault]]:
     """Return what is wrong with the sizes of chunks, by the arrays' names; nothing of it has been decoded.
 
-    Raises
-    ------
-    ValueError
-        If metadata contradict each other, something is stored in a way that palpate does not write, or a chunk is
-        faulty in an array without rows, or of an earlier version, whose chunks have no checksums; names the place.
-    KeyError, TypeError
-        If metadata are no tables of Zarr's.
-    ResourceError
-        If the arrays are larger than the memory that is free.
+    A `ValueError` names the place where metadata contradict each other, where something is stored in a way that palpate
+    does not write, or where a chunk is faulty in an array without rows or of an earlier version, whose chunks have no
+    checksums; metadata that are no tables of Zarr's raise `KeyError` or `TypeError`.
     """
     arrays = [array for file in sorted(path.glob("*/zarr.json")) if (array := _read_array(file.parent))]
     total, free = sum(array.size for array in arrays), psutil.virtual_memory().available

@@ -35,23 +35,13 @@ def refused_as_bad_value() -> Iterator[None]:
 
 
 class RadialRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]
-    """A regressor that holds a network; a subclass learns it in `_learn`.
-
-    Attributes
-    ----------
-    network_ : Network
-        In the units of the data.
-    n_features_in_ : int
-        Number of inputs n.
-    feature_names_in_ : (n,)
-        Where X was a table with named columns.
-    """
+    """A regressor that holds a network; a subclass learns it in `_learn`."""
 
     target: Any
     ranges: Any
     scale_outputs: str
     random_state: Any
-    network_: Network
+    network_: Network  # in the units of the data
     _one_output: bool
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Self:

@@ -27,11 +27,11 @@ from palpate.rbf.regressors import Regressors, Tail
 
 __all__ = ["RBFNetworkRegressor"]
 
-_ITERATIONS = 60  # per size: the next one moves all units again
+_ITERATIONS = 60  # iterations for each size: the next one moves all units again
 _PATIENCE = 3  # sizes in a row that may bring nothing
 _FEWEST = 20  # samples from which a fifth of them can judge
-_LEVEL = 0.9  # at which deviations are calibrated
-_GAIN = 0.98  # what a size must lower the error to, to have brought something
+_LEVEL = 0.9  # level at which deviations are calibrated
+_GAIN = 0.98  # factor down to which a size must lower the error, to have brought something
 
 
 class RBFNetworkRegressor(RadialRegressor):

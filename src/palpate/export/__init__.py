@@ -8,11 +8,11 @@ compilers       the C compilers of this machine, and how a program is compiled w
 check_points    places at which every export is compared with palpate, and how
 check_program   a compiled export that answers them
 c_export        `palpate export c`: write, compile and compare
-lib_export      `palpate export lib`: a shared library, with wrappers whose texts are lib_templates
+lib_export      `palpate export lib`: a shared library, with wrappers for other programs
 check_library   a library that answers through its Python wrapper
 fmu_export      `palpate export fmu`: description, weights and the binaries of fmu_binaries, which read them
 check_fmu       an FMU that answers through FMPy
-core            the C sources
+core            the C sources; templates: texts of exported files
 gltf            a deforming surface as glTF with morph targets
 shape_files     shapes of datasets and of learnt bodies, as VTU series and glTF
 """

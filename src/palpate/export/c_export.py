@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from palpate.errors import AccuracyError
 from palpate.export.c_files import c_files, require_name
 from palpate.export.check_points import Comparison, Precision, compare_body, compare_network
 from palpate.export.check_program import CheckProgram
@@ -60,17 +59,13 @@ class ExportedC:
 
     def as_dict(self) -> dict[str, Any]:
         """Return what was written and compared, for JSON."""
-        parts = {} if self.comparison is None else self.comparison.parts
-        compared = {
-            k: {"relative": v.relative, "allowed": v.allowed, "count": v.count} for k, v in parts.items()
-        }
         files = [{"file": str(f), "bytes": f.stat().st_size} for f in self.files]
         return {
             "files": files,
             "name": self.name,
             "hash": self.hash,
             "field": self.field,
-            "compared": compared or None,
+            "compared": None if self.comparison is None else self.comparison.as_dict(),
         }
 
 
@@ -130,15 +125,13 @@ def export_c(
         with tempfile.TemporaryDirectory() as place:
             tried = ExportedC(_write(Path(place), texts), name, block.hash, block.field, None)
             comparison = compare_c(thing, block, tried, path, single=single)
-        if not comparison.passed:
-            raise AccuracyError(
-                f"The exported files do not answer as palpate does: {comparison}.",
-                why="Single precision is too coarse for this body."
-                if single
-                else "The compiler may bend the arithmetic.",
-                fix="Nothing was written. "
-                + ("Export in double precision." if single else "Try another compiler, and report this."),
-            )
+        why = (
+            "Single precision is too coarse for this body."
+            if single
+            else "The compiler may bend the arithmetic."
+        )
+        fix = "Export in double precision." if single else "Try another compiler, and report this."
+        comparison.require("The exported files do", why=why, fix=f"Nothing was written. {fix}")
     with system_errors(f"The folder {folder} could not be made."):
         folder.mkdir(exist_ok=True)
     return ExportedC(_write(folder, texts), name, block.hash, block.field, comparison)

@@ -9,25 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.export.c_templates import (
-    BODY,
-    BODY_API,
-    CMAKE,
-    EXAMPLE,
-    FIELD_API,
-    FIELD_CODE,
-    HEADER,
-    HEADER_END,
-    LIMITS,
-    MEMORY_API,
-    MEMORY_CODE,
-    NETWORK,
-    NETWORK_API,
-    NETWORK_EXAMPLE,
-    RELEASE_API,
-    RELEASE_CODE,
-)
-from palpate.export.core_source import core_source
+from palpate.export.core_source import core_source, fill_template
 from palpate.export.weights_block import ARRAYS, FIELD, NET, POINTS, ROOT, Table, WeightsBlock
 from palpate.network import Network
 from palpate.surrogates import Surrogate
@@ -35,7 +17,7 @@ from palpate.units import Quantity, Range
 
 __all__ = ["body_sizes", "c_files", "require_name"]
 
-_WIDTH = 118
+_WIDTH = 118  # characters of a line of numbers
 # bytes of all stack frames of the core together: double (False) and single precision (True)
 _STACK = {False: 12_000, True: 8_000}
 _RADIAL, _SURFACE = 40, 8000  # operations of a radial function; of five distances to a curved surface
@@ -72,7 +54,6 @@ class _Facts:
     inputs: tuple[Range, ...]
     outputs: tuple[Quantity, ...]
     felt: int
-    along: np.ndarray | None = None
 
     @property
     def real(self) -> str:
@@ -81,50 +62,49 @@ class _Facts:
 
 def c_files(thing: Surrogate | Network, block: WeightsBlock, name: str, *, single: bool) -> dict[str, str]:
     """Return the texts of all files by their names; `name` begins all names in C, `single` gives 32-bit numbers."""
-    if isinstance(thing, Network):
-        facts = _Facts(name, single, block, str(thing), thing.inputs, thing.outputs, 0)
-        header, public, example = _network_header(facts), NETWORK, NETWORK_EXAMPLE
-    else:
-        felt = len(thing.energy.baseline.directions)
-        body = BODY.replace("@SIZES@", ", ".join(map(str, body_sizes(thing, block))))
-        facts = _Facts(
-            name,
-            single,
-            block,
-            str(thing).splitlines()[0],
-            thing.inputs,
-            (),
-            felt,
-            thing.energy.baseline.directions,
-        )
-        header, public, example = (
-            _body_header(facts, thing),
-            body + _memory_part(block) + _field_part(block),
-            EXAMPLE,
-        )
-    files = {f"{name}.h": header, f"{name}.c": _source(facts, public)}
+    outputs, felt, title, parts = (
+        thing.outputs if isinstance(thing, Network) else (),
+        0,
+        str(thing),
+        ["NETWORK"],
+    )
+    if isinstance(thing, Surrogate):
+        felt, title = len(thing.energy.baseline.directions), title.splitlines()[0]
+        has = {"BODY": True, "MEMORY": block.memory, "RELEASE": block.releases, "FIELD": block.field}
+        parts = [part for part, there in has.items() if there]
+    facts = _Facts(name, single, block, title, thing.inputs, outputs, felt)
+    words = _words(facts, thing)
+    files = {
+        f"{name}.h": _head(facts, _notes(facts, thing)) + fill_template("api.h", words, parts),
+        f"{name}.c": _source(facts) + fill_template("api.c", words, parts),
+    }
     if block.field:
         files[f"{name}_field.c"] = _field_source(facts)
-    files["example.c"] = _fill_template(example, facts)
-    sources = " ".join(file for file in files if file.endswith(".c") and file != "example.c")
-    files["CMakeLists.txt"] = _fill_template(CMAKE, facts).replace("@SOURCES@", sources)
+    files["example.c"] = fill_template("example.c", words, parts)
+    words["@SOURCES@"] = " ".join(file for file in files if file.endswith(".c") and file != "example.c")
+    files["CMakeLists.txt"] = fill_template("CMakeLists.txt", words, parts)
     return files
 
 
-def _fill_template(text: str, facts: _Facts) -> str:
-    along = "" if facts.along is None else ", ".join(_braces_around(row, facts) for row in facts.along)
-    middle = (
-        ", ".join(_number((r.low + r.high) / 2, single=facts.single) for r in facts.inputs[facts.felt :])
-        or "0"
-    )
-    for word, value in (
-        ("NAME", facts.name),
-        ("@REAL@", facts.real),
-        ("@MIDDLE@", middle),
-        ("@ALONG@", along),
-    ):
-        text = text.replace(word, value)
-    return text
+def _words(facts: _Facts, thing: Surrogate | Network) -> dict[str, str]:
+    """Return what stands in the files for the words of the templates."""
+    sizes, along = [len(facts.inputs)], ""
+    if isinstance(thing, Surrogate):
+        sizes = list(body_sizes(thing, facts.block))
+        along = ", ".join(_braces_around(row, facts) for row in thing.energy.baseline.directions)
+    places = ("INPUTS", "FELT", "PARAMETERS", "WORK", "STATE", "SHAPE", "NODES", "COMPONENTS")
+    middle = [_number((r.low + r.high) / 2, single=facts.single) for r in facts.inputs[facts.felt :]]
+    return {
+        "NAME": facts.name,
+        "@REAL@": facts.real,
+        "@MIDDLE@": ", ".join(middle) or "0",
+        "@ALONG@": along,
+        "@OUTPUTS@": str(len(facts.outputs)),
+        "@SIZES@": ", ".join(map(str, sizes)),
+        "@LATENT@": str(int(facts.block.tables[NET].values[4])),
+        "@LAW@": facts.block.memory,
+        "@HASH@": facts.block.hash,
+    } | {f"@{place}@": str(size) for place, size in zip(places, sizes, strict=False)}
 
 
 def _braces_around(row: np.ndarray, facts: _Facts) -> str:
@@ -137,7 +117,7 @@ def _comment(lines: list[str]) -> str:
 
 
 def _head(facts: _Facts, further: list[str]) -> str:
-    from palpate import __version__
+    from palpate.version import __version__
 
     rows = [f"{r.name} from {r.low:g} to {r.high:g} {r.unit}".rstrip() for r in facts.inputs]
     lines = [
@@ -195,41 +175,13 @@ def _thousands(count: int) -> str:
     return f"{count / 1e3:.2g}" if count < 1e5 else f"{count / 1e3:.0f}"
 
 
-def _body_header(facts: _Facts, surrogate: Surrogate) -> str:
-    baseline = surrogate.energy.baseline
-    x = "displacement of what the hand holds from its rest" if baseline.holds else "centre of the probe"
-    lines = ["", f"x (3) is the {x}, m; p are the inputs after the first {facts.felt}, in their units."]
-    text = _head(facts, lines) + _fill_template(HEADER, facts)
-    sizes = {
-        "INPUTS": len(facts.inputs),
-        "FELT": facts.felt,
-        "PARAMETERS": len(facts.inputs) - facts.felt,
-        "DEVIATION_WORK": _work_size(facts.block),
-    }
-    text += "".join(f"#define {facts.name}_{k} {v}\n" for k, v in sizes.items()) + _fill_template(
-        BODY_API, facts
-    )
-    if facts.block.memory:
-        assert surrogate.memory is not None
-        size = 4 + _state_size(surrogate)
-        text += _fill_template(MEMORY_API, facts).replace("@STATE@", str(size))
-        text += _fill_template(RELEASE_API, facts) if facts.block.releases else ""
-    if facts.block.field:
-        nodes, components, size = _shape_sizes(facts.block)
-        text += (
-            _fill_template(FIELD_API, facts)
-            .replace("@NODES@", str(nodes))
-            .replace("@COMPONENTS@", str(components))
-        )
-        text = text.replace("@SHAPE@", str(size))
-    return text + HEADER_END
-
-
-def _network_header(facts: _Facts) -> str:
-    named = ["", *(f"output {i}: {q.name} {q.unit}".rstrip() for i, q in enumerate(facts.outputs[:50]))]
-    text = _head(facts, named) + _fill_template(HEADER, facts)
-    text += f"#define {facts.name}_INPUTS {len(facts.inputs)}\n#define {facts.name}_OUTPUTS {len(facts.outputs)}\n"
-    return text + _fill_template(NETWORK_API, facts) + HEADER_END
+def _notes(facts: _Facts, thing: Surrogate | Network) -> list[str]:
+    """Return what the header tells of the arguments of its functions."""
+    if isinstance(thing, Network):
+        return ["", *(f"output {i}: {q.name} {q.unit}".rstrip() for i, q in enumerate(facts.outputs[:50]))]
+    holds = thing.energy.baseline.holds
+    x = "displacement of what the hand holds from its rest" if holds else "centre of the probe"
+    return ["", f"x (3) is the {x}, m; p are the inputs after the first {facts.felt}, in their units."]
 
 
 def _work_size(block: WeightsBlock) -> int:
@@ -239,16 +191,10 @@ def _work_size(block: WeightsBlock) -> int:
 def body_sizes(surrogate: Surrogate, block: WeightsBlock) -> tuple[int, ...]:
     """Return the eight sizes that `NAME_sizes` gives."""
     inputs, felt = len(surrogate.inputs), len(surrogate.energy.baseline.directions)
-    state = 4 + _state_size(surrogate) if block.memory else 0
+    # the four numbers of a ledger come first in the state of a memory
+    state = 4 + surrogate.memory.c_size() if block.memory and surrogate.memory is not None else 0
     nodes, components, shape = _shape_sizes(block) if block.field else (0, 0, 0)
     return inputs, felt, inputs - felt, _work_size(block), state, shape, nodes, components
-
-
-def _state_size(surrogate: Surrogate) -> int:
-    """Return how many numbers the state of a memory has, after the four of its ledger."""
-    memory = surrogate.memory
-    assert memory is not None
-    return memory.c_size()
 
 
 def _shape_sizes(block: WeightsBlock) -> tuple[int, int, int]:
@@ -256,7 +202,8 @@ def _shape_sizes(block: WeightsBlock) -> tuple[int, int, int]:
     return nodes, components, 8 + 16 + 1 + modes + knots * 4 * components
 
 
-def _source(facts: _Facts, public: str) -> str:
+def _source(facts: _Facts) -> str:
+    """Return the source before its public functions: the core and the weights."""
     first = f'#include "{facts.name}.h"\n' + ("#define PP_SINGLE\n" if facts.single else "")
     tables, external = [], []
     for place, table in _tables_to_store(facts.block):
@@ -271,11 +218,7 @@ def _source(facts: _Facts, public: str) -> str:
             ]
     body = _comment(["the evaluator core of palpate"]) + core_source(facts.block)
     weights = "\n".join(["\n/* the weights */", *external, *tables, _model(facts)])
-    latent = str(int(facts.block.tables[NET].values[4]))
-    last = (
-        _fill_template(public + LIMITS, facts).replace("@HASH@", facts.block.hash).replace("@LATENT@", latent)
-    )
-    return first + body + weights + last
+    return first + body + weights
 
 
 def _field_source(facts: _Facts) -> str:
@@ -365,13 +308,3 @@ def _number(value: float, *, single: bool) -> str:
     mantissa, _, exponent = value.hex().partition("p")
     text = f"{mantissa.rstrip('0').rstrip('.')}p{int(exponent)}"
     return text + "F" if single else text
-
-
-def _memory_part(block: WeightsBlock) -> str:
-    text = MEMORY_CODE if block.memory else ""
-    text += RELEASE_CODE if block.releases else ""
-    return text.replace("@LAW@", block.memory)
-
-
-def _field_part(block: WeightsBlock) -> str:
-    return FIELD_CODE if block.field else ""

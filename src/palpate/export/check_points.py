@@ -13,10 +13,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
+from palpate.errors import AccuracyError
 from palpate.export.field_tables import PROMISE, deepest_touches
 from palpate.network import Network
 from palpate.network.network_kernels import regressor_rows_into
@@ -28,6 +30,7 @@ __all__ = [
     "Asker",
     "Comparison",
     "Difference",
+    "ExportedFile",
     "Precision",
     "compare_body",
     "compare_field",
@@ -37,8 +40,9 @@ __all__ = [
     "true_answers",
 ]
 
-ANSWERS = 21  # an answer's 19 numbers, the deviation, the flags
+ANSWERS = 21  # numbers of an answer: its 19, the deviation, the flags
 CONTACT, TRUSTED, NOT_A_NUMBER, TOO_DEEP = 1, 2, 4, 8
+# relative errors: at condition 1, at most, and of the deviation
 _TIGHT, _LOOSEST, _DEVIATION = 1e-12, 1e-9, 1e-5
 _PARTS = {
     "energy": [0],
@@ -47,7 +51,7 @@ _PARTS = {
     "stiffness": list(range(5, 14)),
     "amplitude": [15],
 }
-_ROUND_OFF = 1e-14  # m, of a depth
+_ROUND_OFF = 1e-14  # m, depth that is round-off
 _TOUCHES = 24  # places at which a field is compared, beside the deepest touches
 _STROKE = 300  # steps of a memory's stroke
 
@@ -93,6 +97,35 @@ class Comparison:
     def __str__(self) -> str:
         words = [f"{name} {part.relative:.1e} (of {part.allowed:.0e})" for name, part in self.parts.items()]
         return "largest relative differences: " + ", ".join(words)
+
+    def require(self, export: str, *, why: str, fix: str) -> None:
+        """Refuse an export whose numbers are farther off than they may be; `export` names it."""
+        if not self.passed:
+            raise AccuracyError(f"{export} not answer as palpate does: {self}.", why=why, fix=fix)
+
+    def as_dict(self) -> dict[str, dict[str, float]]:
+        """Return the differences by quantity, for JSON."""
+        return {
+            name: {"relative": part.relative, "allowed": part.allowed, "count": part.count}
+            for name, part in self.parts.items()
+        }
+
+
+@dataclass(frozen=True)
+class ExportedFile:
+    """A file that was written, and how far it is from palpate."""
+
+    file: Path
+    hash: str  # SHA-256 of the weights, as in every other export of the body
+    comparison: (
+        Comparison | None
+    )  # None where the program that runs it is missing, or nothing was to be compared
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what was written and compared, for JSON."""
+        compared = {} if self.comparison is None else self.comparison.as_dict()
+        size = self.file.stat().st_size
+        return {"file": str(self.file), "bytes": size, "sha256": self.hash, "compared": compared}
 
 
 @dataclass(frozen=True)

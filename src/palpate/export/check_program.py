@@ -16,7 +16,7 @@ from palpate.export.core_source import core_file
 
 __all__ = ["CheckProgram"]
 
-_LONGEST = 120.0  # s
+_LONGEST = 120.0  # s that a checking program may take
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ __all__ = ["COMPILERS", "STRICT", "compile_c", "find_compiler"]
 
 COMPILERS = ("cc", "gcc", "clang", "tcc")
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
-_LONGEST = 300.0  # s
+_LONGEST = 300.0  # s that a compiler may take
 
 
 def find_compiler(name: str | None = None) -> str | None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection, Mapping
 from importlib import resources
 
 from palpate.export.weights_block import WeightsBlock
 
-__all__ = ["core_file", "core_source", "generic_source"]
+__all__ = ["core_file", "core_source", "fill_template", "generic_source"]
 
 _BASELINES = ("contact_baseline.c", "pad_baseline.c", "constant_baseline.c")
+_PART = re.compile(r"@IF (\w+)@\n(.*?)@END@\n", re.DOTALL)
 _MEMORIES = ("relaxation.c", "indentation.c", "iwan_elements.c")
 
 
@@ -43,6 +46,15 @@ def generic_source(*programs: str) -> str:
     texts += [(surrogates / "memories" / name).read_text("utf-8") for name in _MEMORIES]
     texts += [core_file(name) for name in ("generic_memory.c", "block.c", *programs)]
     return "\n".join(texts)
+
+
+def fill_template(name: str, words: Mapping[str, str], parts: Collection[str]) -> str:
+    """Return a text of ``templates`` with words filled in one after the other, and with those of its IF parts."""
+    text = (resources.files("palpate.export") / "templates" / f"{name}.in").read_text("utf-8")
+    text = _PART.sub(lambda match: match[2] if match[1] in parts else "", text)
+    for word, value in words.items():
+        text = text.replace(word, value)
+    return text
 
 
 def _hooks(name: str) -> str:

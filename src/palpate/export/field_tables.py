@@ -24,13 +24,13 @@ from palpate.units import bounds
 
 __all__ = ["PROMISE", "SURFACE", "VARIED", "RoundedModes", "chosen_field", "deepest_touches", "field_tables"]
 
-SURFACE, VARIED = 49, 52
-PROMISE = 1e-4  # of a field's largest change: how far the field that goes out may be off
-_LARGEST = 32767
+SURFACE, VARIED = 49, 52  # places of the field's surface and varied tables in the block
+PROMISE = 1e-4  # error over a field's largest change, to which the exported field keeps
+_LARGEST = 32767  # largest number of int16, in which modes are rounded
 # share of the promise that rounding the modes may use up; the rest is for places, and for single precision
 _SHARE = 0.9
 _DEEPEST = 24  # touches from which the largest change is taken
-_HALVINGS = 60
+_HALVINGS = 60  # halvings in the search for the steps of the modes
 _OTHERS = 1000  # places beside the trained ones at which modes are held precise enough
 
 
@@ -47,9 +47,8 @@ class RoundedModes:
         rows = np.concatenate([shown.rest[None], shown.modes])
         size = np.abs(rows).reshape(len(rows), -1)
         largest = size.max(axis=1, initial=0.0)
-        exact = ((size == 0.0) | (size == largest[:, None])).all(
-            axis=1
-        )  # none, or 1 everywhere as a stretch at rest
+        # a mode of zeros, or of one number everywhere, as a stretch at rest
+        exact = ((size == 0.0) | (size == largest[:, None])).all(axis=1)
         finest, X = largest / _LARGEST, _all_touches(surrogate, shown)
         share = np.hstack([np.ones((len(X), 1)), np.abs(shown.coefficients(X))]) * ~exact
         most = np.maximum(share.max(axis=0, initial=0.0), 1e-300)

@@ -24,7 +24,16 @@ from palpate.export.core_source import generic_source
 
 __all__ = ["build_binaries", "built_binaries", "fmu_source", "main"]
 
-_SOURCES = ("memory_states.c", "fmi_instance.c", "fmi_body.c", "fmi_derivatives.c", "fmi2.c", "fmi3.c")
+_SOURCES = (
+    "memory_states.c",
+    "fmi_instance.c",
+    "fmi_body.c",
+    "fmi_derivatives.c",
+    "fmi_types.c",
+    "fmi_calls.c",
+    "fmi2.c",
+    "fmi3.c",
+)
 # small code for macOS: both machines' parts stand in one file of FMI 2.0, which is to be less than 200 kB
 _SMALL = ("-Os", "-Wl,-headerpad,0x100")  # room in the head for a signature, and not a page of it
 TARGETS: Mapping[str, tuple[str, ...]] = {
@@ -49,7 +58,7 @@ _OPTIONS = (
     "-Wextra",
 )
 _HASHES = "hashes.json"
-_LONGEST = 600.0  # s
+_LONGEST = 600.0  # s that a build may take
 
 
 def fmu_source() -> str:

@@ -24,7 +24,7 @@ def model_description(surrogate: Surrogate, name: str, guid: str, version: str) 
 
     `name` is the model identifier; `guid`, the SHA-256 of the weights, is guid or instantiation token.
     """
-    from palpate import __version__
+    from palpate.version import __version__
 
     variables = body_variables(surrogate)
     words, exchange = quoteattr(str(surrogate).splitlines()[0]), has_exchange(surrogate)

@@ -13,8 +13,9 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from palpate.errors import AccuracyError, UsageError
+from palpate.errors import UsageError
 from palpate.export.c_files import require_name
 from palpate.export.check_fmu import CheckFmu
 from palpate.export.check_points import Comparison, compare_body
@@ -30,7 +31,7 @@ from palpate.surrogates.model_card import card_of
 __all__ = ["VERSIONS", "ExportedFmu", "export_fmu"]
 
 VERSIONS = ("2.0", "3.0")
-_WHEN = (1980, 1, 1, 0, 0, 0)  # the same file each time
+_WHEN = (1980, 1, 1, 0, 0, 0)  # date of each file in the archive, so that equal contents make equal archives
 
 
 @dataclass(frozen=True)
@@ -76,13 +77,20 @@ class ExportedFmu:
         known = self.deviation and surrogate.energy.root is not None
         with CheckFmu(self.path) as fmu:
             comparison = compare_body(surrogate, fmu, deviation=known, partial=True)
-        if not comparison.passed:
-            raise AccuracyError(
-                f"The FMU does not answer as palpate does: {comparison}.",
-                why="Its binary or this machine may bend the arithmetic.",
-                fix="Report this: it must not be used.",
-            )
+        why, fix = "Its binary or this machine may bend the arithmetic.", "Report this: it must not be used."
+        comparison.require("The FMU does", why=why, fix=fix)
         return comparison
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what was written and compared, for JSON."""
+        return {
+            "file": str(self.path),
+            "hash": self.hash,
+            "fmi": self.fmi,
+            "platforms": list(self.platforms),
+            "exchange": self.exchange,
+            "compared": None if self.comparison is None else self.comparison.as_dict(),
+        }
 
 
 def export_fmu(

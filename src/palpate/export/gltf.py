@@ -23,9 +23,9 @@ from palpate.output_files import require_outputs
 
 __all__ = ["MOST_TARGETS", "ShapeSeries", "glb_bytes", "write_glb"]
 
-MOST_TARGETS = 8  # as many as the weakest viewers show
-_FLOAT, _UNSIGNED = 5126, 5125
-_VERTICES, _INDICES = 34962, 34963
+MOST_TARGETS = 8  # morph targets, as many as the weakest viewers show
+_FLOAT, _UNSIGNED = 5126, 5125  # component types of glTF
+_VERTICES, _INDICES = 34962, 34963  # targets of a buffer view in glTF
 _MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 _COLOUR = (0.80, 0.45, 0.40, 1.0)
 

@@ -26,12 +26,12 @@ from palpate.export.weights_block import Table
 
 __all__ = ["ROW", "SIDE", "cut_tiles", "lattice_table"]
 
-SIDE = 4  # nodes of a tile
-ROW = 4095  # digits of a row
-GROUP = 8  # tiles to a place
-BASE, SLOPE, WIDEST = 5, 3, 26  # digits of a base and of a slope; bits of what remains
+SIDE = 4  # nodes along the side of a tile
+ROW = 4095  # digits in a row
+GROUP = 8  # tiles that share one stored start
+BASE, SLOPE, WIDEST = 5, 3, 26  # digits of a base and of a slope; most bits of a remainder
 HEAD = BASE + 3 * SLOPE
-BITS = 6  # of a digit
+BITS = 6  # bits of a digit
 _PLAIN = [c for c in range(32, 127) if chr(c) not in '"?\\']
 _DIGITS = np.array([max(c for c in _PLAIN if (93 * c >> 7) % 64 == v) for v in range(64)], dtype=np.uint8)
 

@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from palpate.errors import AccuracyError
 from palpate.export.c_export import ExportedC, block_of, export_c
 from palpate.export.check_library import CheckLibrary
 from palpate.export.check_points import Comparison, compare_body
 from palpate.export.compilers import compile_c, find_compiler
-from palpate.export.lib_templates import CSHARP, MATLAB_EXAMPLE, MATLAB_HEADER, PYTHON, UNREAL
+from palpate.export.core_source import fill_template
 from palpate.export.weights_block import ROOT
 from palpate.files import system_errors, write_file
 from palpate.output_files import require_outputs, with_seal
@@ -132,11 +131,11 @@ def _build(
     block = block_of(surrogate, **parts)
     asked = CheckLibrary(folder / f"{done.name}.py")
     comparison = compare_body(surrogate, asked, field=block.field, deviation=ROOT in block.tables)
-    if not comparison.passed:
-        raise AccuracyError(
-            f"The library does not answer as palpate does: {comparison}.",
-            fix="Nothing was written. Try another compiler, and report this.",
-        )
+    why, fix = (
+        "The compiler may bend the arithmetic.",
+        "Nothing was written. Try another compiler, and report this.",
+    )
+    comparison.require("The library does", why=why, fix=fix)
     return replace(whole, comparison=comparison)
 
 
@@ -175,29 +174,13 @@ def _wrappers(surrogate: Surrogate, done: ExportedC) -> dict[str, str]:
         "NAME": name,
     }
     memory = surrogate.memory
-    has = {
-        "@MEMORY@": memory is not None,
-        "@RELEASE@": memory is not None and memory.moves_rest,
-        "@FIELD@": bool(done.field),
+    parts = [] if memory is None else ["MEMORY"] + ["RELEASE"] * memory.moves_rest
+    parts += ["FIELD"] * bool(done.field)
+    templates = {
+        f"{name}.py": "wrapper.py",
+        f"{words['CLASS']}.cs": "wrapper_unity.cs",
+        f"{name}_unreal.h": "wrapper_unreal.h",
+        f"{name}_matlab.h": "wrapper_matlab.h",
+        f"{name}_example.m": "example.m",
     }
-    texts = {
-        f"{name}.py": PYTHON,
-        f"{words['CLASS']}.cs": CSHARP,
-        f"{name}_unreal.h": UNREAL,
-        f"{name}_matlab.h": MATLAB_HEADER,
-        f"{name}_example.m": MATLAB_EXAMPLE,
-    }
-    return {file: _written(text, words, has) for file, text in texts.items()}
-
-
-def _written(text: str, words: dict[str, str], has: dict[str, bool]) -> str:
-    """Fill in words, and keep or drop the lines of what a body may have."""
-    lines = []
-    for line in text.splitlines():
-        mark = next((m for m in has if line.startswith(m)), None)
-        if mark is None or has[mark]:
-            lines.append(line.removeprefix(mark or ""))
-    whole = "\n".join(lines) + "\n"
-    for word, value in words.items():
-        whole = whole.replace(word, value)
-    return whole
+    return {file: fill_template(template, words, parts) for file, template in templates.items()}

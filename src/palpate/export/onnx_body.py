@@ -24,8 +24,8 @@ from palpate.surrogates.energy import LearntEnergy
 
 __all__ = ["BODY_OUTPUTS", "add_body"]
 
-SLACK = 1e-9  # of a range: round-off at its edge is still inside, as in the compiled kernels
-STEP = 1e-3  # of the probe's radius: the difference that finds the third derivative of the distance
+SLACK = 1e-9  # share of a range: round-off at its edge is still inside, as in the compiled kernels
+STEP = 1e-3  # step over the probe's radius, of the difference for the third derivative of the distance
 BODY_OUTPUTS = ("energy", "force", "stiffness", "amplitude", "slope", "depth", "inside", "deviation")
 
 
@@ -336,9 +336,8 @@ def _answers(
     shapes = {"stiffness": (3, 3), "force": (3,), "slope": (3,)}
     for name, out in (outputs | {"depth": depth}).items():
         shown = finite.spread(2) if name == "stiffness" else finite
-        otherwise = (
-            0.0 if name in {"force", "stiffness"} else math.nan
-        )  # nobody is pushed by what is no number
+        # what is not a number must not push anybody
+        otherwise = 0.0 if name in {"force", "stiffness"} else math.nan
         graph.output(name, graph.where(shown, out, otherwise), shapes.get(name, (1,)))
     graph.output("inside", inside & finite, (1,), np.bool_)
 

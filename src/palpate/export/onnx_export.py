@@ -8,14 +8,21 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from palpate.errors import AccuracyError, UsageError
-from palpate.export.check_points import ANSWERS, Comparison, Precision, compare_body, compare_network
+from palpate.errors import UsageError
+from palpate.export.check_points import (
+    ANSWERS,
+    Comparison,
+    ExportedFile,
+    Precision,
+    compare_body,
+    compare_network,
+)
 from palpate.export.onnx_body import add_body
 from palpate.export.onnx_graph import Graph, require_onnx
 from palpate.export.onnx_network import add_network
@@ -26,20 +33,11 @@ from palpate.output_files import require_outputs
 from palpate.surrogates import Surrogate
 from palpate.surrogates.model_card import card_of
 
-__all__ = ["ExportedOnnx", "OnnxAsker", "export_onnx"]
+__all__ = ["OnnxAsker", "export_onnx"]
 
 CONTACT, TRUSTED, NOT_A_NUMBER, TOO_DEEP = 1, 2, 4, 8
 COLUMNS = {"energy": slice(0, 1), "depth": slice(1, 2), "force": slice(2, 5), "stiffness": slice(5, 14)}
 COLUMNS |= {"amplitude": slice(15, 16), "slope": slice(16, 19), "deviation": slice(19, 20)}
-
-
-@dataclass(frozen=True)
-class ExportedOnnx:
-    """A model that was written, and how far it is from palpate."""
-
-    file: Path
-    hash: str  # SHA-256 of the weights, as in every other export of the body
-    comparison: Comparison | None  # None where ONNX Runtime is not installed, or nothing was to be compared
 
 
 def export_onnx(
@@ -51,7 +49,7 @@ def export_onnx(
     check: bool = True,
     tolerance: float = 1e-2,
     overwrite: bool = False,
-) -> ExportedOnnx:
+) -> ExportedFile:
     """Write a body or a network as NAME.onnx, and compare it with palpate in ONNX Runtime if that is installed.
 
     `single` gives numbers of 32 bits, the only ones that the browser's runtimes take; `elastic` leaves a memory out.
@@ -78,15 +76,10 @@ def export_onnx(
         add_body(graph, thing.energy)
     model = graph.model(name, _metadata(thing, block))
     comparison = _compared(thing, model, Precision(single, tolerance)) if check else None
-    if comparison is not None and not comparison.passed:
-        raise AccuracyError(
-            f"The ONNX model of {name} does not answer as palpate does.",
-            why=str(comparison),
-            fix="Export it in double precision."
-            if single
-            else "Nothing was written. Report this with the model file.",
-        )
-    return ExportedOnnx(write_file(Path(path), model.SerializeToString()), block.hash, comparison)
+    if comparison is not None:
+        fix = "Export it in double precision." if single else "Report this with the model file."
+        comparison.require(f"The ONNX model of {name} does", why="", fix=f"Nothing was written. {fix}")
+    return ExportedFile(write_file(Path(path), model.SerializeToString()), block.hash, comparison)
 
 
 def _metadata(thing: Surrogate | Network, block: WeightsBlock) -> dict[str, str]:
@@ -144,9 +137,8 @@ class OnnxAsker:
         """Return an answer's 19 numbers, the deviation and the flags for each row of X (N, 3 + p)."""
         baseline, names = self._energy.baseline, [o.name for o in self._session.get_outputs()]
         D = baseline.directions
-        X = np.where(
-            np.isfinite(X).all(axis=1)[:, None], X, np.nan
-        )  # an infinite place along one axis is none along another
+        # a place that is infinite along one axis has no coordinates along the others
+        X = np.where(np.isfinite(X).all(axis=1)[:, None], X, np.nan)
         U = X if len(D) == 3 else np.hstack([X[:, :3] @ D.T, X[:, 3:]])
         got = dict(zip(names, self._session.run(None, {"x": U.astype(self._kind)}), strict=True))
         out = np.full((len(X), ANSWERS), np.nan)

@@ -15,7 +15,7 @@ from palpate.errors import UsageError
 
 __all__ = ["OPSET", "Graph", "Value", "require_onnx"]
 
-OPSET, IR = 13, 8
+OPSET, IR = 13, 8  # versions of the operators and of the format of ONNX
 
 
 def require_onnx() -> Any:

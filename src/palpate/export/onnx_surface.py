@@ -19,11 +19,10 @@ from palpate.surrogates.surface import TouchedSurface
 
 __all__ = ["Distance", "distance_to"]
 
-# of places (N, 3) to the signed distance (N, 1), its gradient (N, 3) and its Hessian (N, 3, 3)
+# places (N, 3) to the signed distance (N, 1), its gradient (N, 3) and its Hessian (N, 3, 3)
 Distance = Callable[[Value], tuple[Value, Value, Value]]
-Lookup = Callable[
-    [Sequence[Value]], Value
-]  # of first nodes (N, 1), one for each axis, to coefficients (N, 4^axes)
+# first nodes (N, 1), one array for each axis, to coefficients (N, 4^axes)
+Lookup = Callable[[Sequence[Value]], Value]
 FAR = 1e6  # cells beyond the box, after which nothing changes
 
 

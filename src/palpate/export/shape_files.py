@@ -22,7 +22,7 @@ __all__ = ["SHAPES", "series_of_dataset", "series_of_surrogate", "write_shapes",
 SHAPES = (".pvd", ".vtu", ".glb")
 """Ends of the names of files that hold shapes."""
 
-_STATE = re.compile(r"\d{4,}\.vtu")  # files of a series
+_STATE = re.compile(r"\d{4,}\.vtu")  # names of the files of a series
 
 
 def write_shapes(

@@ -26,9 +26,9 @@ from palpate.surrogates import TouchedSurface
 __all__ = ["felt_coefficients", "surface_tables"]
 
 _SAME = 5e-17  # m: round-off of distances of some centimetres
-_BESIDE = 5.0  # cells beyond which a node of a flat surface is not heard
+_BESIDE = 5.0  # cells beyond which a node of a flat surface has no influence
 _WORTH = 0.8  # share of the dense table above which tiles are not worth it
-_RIM = 3  # nodes along which a spline goes on straight beyond its box
+_RIM = 3  # nodes along which a spline is continued straight beyond its box
 
 
 def surface_tables(surface: TouchedSurface) -> tuple[Table, Table, Table]:

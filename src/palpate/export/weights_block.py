@@ -61,11 +61,11 @@ HEAD, NUMBERS, LIMITS, POINTS, AXES, NET, ROOT, BASELINE, MEMORY, FIELD, FIELD_N
     36,
     44,
 )
-ROOM = 12  # arrays of a baseline, and of a memory
-ENDLESS = 1e30  # stands for infinity
-FAR = 1e15  # where points are that fill a row up
+ROOM = 12  # arrays that a baseline may have, and a memory
+ENDLESS = 1e30  # number that stands for infinity
+FAR = 1e15  # coordinate of points that fill up a row
 _KINDS = {"float64": 1, "int32": 2, "float32": 3, "int16": 4, "uint8": 6}
-_TILES = 5
+_TILES = 5  # kind of an array in tiles, beside those of `_KINDS`
 
 
 @dataclass(frozen=True, eq=False)

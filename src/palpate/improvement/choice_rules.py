@@ -38,8 +38,8 @@ __all__ = [
     "image_distances",
 ]
 
-FARTHEST_EVERY = 4  # one pick in so many is the farthest place: an insurance against a wrong process
-_PARTS = 5  # of the solves, one of which each disagreeing model lacks
+FARTHEST_EVERY = 4  # picks of which one is the farthest place: an insurance against a wrong process
+_PARTS = 5  # parts of the solves, one of which each disagreeing model lacks
 
 
 @dataclass(eq=False)

@@ -33,15 +33,13 @@ __all__ = ["GradientProcess", "Observations", "covariance", "fit_process", "no_s
 LEVEL, SLOPE = 25.0, 4.0
 """Prior variances a and b of the affine part, in units of the process's own variance."""
 
-SHORTEST, LONGEST = 0.15, 6.0  # lengths, in scaled inputs: half of a range is 1
-QUIETEST, NOISIEST = 3e-4, 0.3  # τ
-BEGIN_LENGTH, BEGIN_NOISE = 1.0, 0.01
+SHORTEST, LONGEST = 0.15, 6.0  # lengths in scaled inputs: half of a range is 1
+QUIETEST, NOISIEST = 3e-4, 0.3  # bounds of the noise τ
+BEGIN_LENGTH, BEGIN_NOISE = 1.0, 0.01  # length and noise from which a search begins
 SEARCHED = 60  # observations from which lengths are searched: more cost time and move them little
-FIRST_STEPS, FURTHER_STEPS = (
-    60,
-    16,
-)  # evaluations of the likelihood, of a new process and from the last lengths
-_SPREAD = 0.4  # of the search's simplex, in logarithms
+# evaluations of the likelihood: for a new process, and from the last lengths
+FIRST_STEPS, FURTHER_STEPS = 60, 16
+_SPREAD = 0.4  # size of the search's first simplex, in logarithms
 _MIXED = 1e-9  # entry of a map that mixes two inputs
 
 

@@ -40,12 +40,13 @@ RULES = ("variance", "disagreement", "farthest", "sobol")
 
 FIRST = 12  # Sobol places to begin with, of one depth each
 CANDIDATES = 384  # places of one depth each among which a batch is chosen
-SERIES, DEPTHS = 48, 3  # depth series among which as well, towards the end, and depths of each
-FOLLOWS = 0.6  # cost of a further depth of a series over that of a solve of its own: it starts from the last
-SMALLEST_BATCH, LARGEST_BATCH = 4, 8  # solves
-NEAR = 2.0  # times the wanted error: from there on networks are searched properly, and depth series offered
+SERIES, DEPTHS = 48, 3  # depth series among which a batch is chosen too, towards the end, and depths of each
+# cost of a further depth of a series, which starts from the last, over that of a solve of its own
+FOLLOWS = 0.6
+SMALLEST_BATCH, LARGEST_BATCH = 4, 8  # solves of a batch
+NEAR = 2.0  # factor of the wanted error, below which networks are searched properly and depth series offered
 QUICK, PROPER = 0.1, 0.5  # effort of learning far from the wanted error, and near it
-BETTER = 1.0  # a new surrogate is kept if its error is no more than so many times the last one's
+BETTER = 1.0  # error of a new surrogate over that of the last one, up to which it is kept
 UNSEEN_FIRST, UNSEEN_EACH = 8, 2  # unseen solves at the first judgement, and with each batch
 
 Learner = Callable[[Dataset, float], tuple[Surrogate, Any]]
@@ -294,9 +295,8 @@ class _Improvement:
     def _reason(self) -> str:
         if self._is_complete or self.errors[-1] > self.stop.until:
             pass
-        elif (
-            len(self.errors) == 1
-        ):  # a surrogate of an earlier run: all unseen solves judge it before anything else
+        elif len(self.errors) == 1:
+            # a surrogate of an earlier run: all unseen solves judge it before anything else
             self._judge_by(len(self.unseen))
             self.error = self.errors[-1] = self._error(self.best)
         return self.stop.reason(

@@ -104,13 +104,7 @@ def automatic(
 
 
 def check_target(target: float) -> None:
-    """Refuse a target that is none.
-
-    Raises
-    ------
-    UsageError
-        If it is not a positive number.
-    """
+    """Refuse a target that is no positive number."""
     if isinstance(target, bool) or not isinstance(target, (int, float, np.number)) or not 0 < target < np.inf:
         raise UsageError(
             f"A target of {target!r} can't be reached or missed.",
@@ -120,13 +114,7 @@ def check_target(target: float) -> None:
 
 
 def ranges_of(X: np.ndarray, names: Sequence[str] | None = None) -> tuple[Range, ...]:
-    """Return ranges that the samples X (N, n) span; an input that doesn't vary gets one of length 1 or more about it.
-
-    Raises
-    ------
-    UsageError
-        If X is not a table of finite numbers.
-    """
+    """Return ranges that samples X (N, n) span; an input that doesn't vary gets one of length 1 or more about it."""
     X = numbers("Inputs X", X, (None, None))
     low, high = X.min(axis=0), X.max(axis=0)
     size = np.maximum(np.abs(low), np.abs(high))

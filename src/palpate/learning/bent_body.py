@@ -85,21 +85,11 @@ class Refinement:
 
 @dataclass(frozen=True, eq=False)
 class LearntBent:
-    """A body that loads bend, and how it was learnt.
-
-    Attributes
-    ----------
-    surrogate : Surrogate
-        The learnt body.
-    energy : EnergyHistory
-        How its energy was found.
-    filter : Learned
-        The sequential filter's answer for the nodes' displacements, with its history.
-    """
+    """A body that loads bend, and how it was learnt."""
 
     surrogate: Surrogate
-    energy: EnergyHistory
-    filter: Learned
+    energy: EnergyHistory  # how its energy was found
+    filter: Learned  # the sequential filter's answer for the nodes' displacements
 
 
 def learn_bent(
@@ -238,7 +228,19 @@ def node_outputs(data: Dataset) -> tuple[tuple[Quantity, ...], list[tuple[int, i
 def hand_coordinates(
     data: Dataset, touch_node: int, touched: tuple[int, ...], compliance: float
 ) -> np.ndarray:
-    """Return h (N, k): the held node's displacement along each touched load, plus the coupling's stretch, m."""
+    """Return h (N, k): the held node's displacement along each touched load, plus the coupling's stretch, m.
+
+    Parameters
+    ----------
+    data : Dataset
+        N solves of the body.
+    touch_node : int
+        The held node.
+    touched : k ints
+        Numbers of the loads that the hand supplies.
+    compliance : float
+        Of the coupling between hand and body, m/N.
+    """
     along = data.displacement[:, touch_node, :2] @ data.load_directions[list(touched), :2].T
     return np.asarray(along + compliance * data.X[:, list(touched)])
 

@@ -19,16 +19,9 @@ def declared_symmetry(data: Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def widen_ranges(ranges: tuple[Range, ...], matrices: np.ndarray, about: np.ndarray) -> tuple[Range, ...]:
-    """The ranges of a vector's components, so that all images of their box are inside.
+    """Return the ranges of a vector's n components, so that all images of their box are inside.
 
-    Parameters
-    ----------
-    ranges : n ranges
-        Intervals of the components, in any unit.
-    matrices : (k, n, n)
-        Isometries, the identity among them.
-    about : (n,)
-        The point that stays.
+    Isometries are (k, n, n), the identity among them, and leave the point `about` (n,) where it is.
     """
     low, high = bounds(ranges)
     corners = np.array(list(itertools.product(*zip(low, high, strict=True))))

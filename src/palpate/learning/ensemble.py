@@ -23,15 +23,9 @@ _AS_GOOD = 1.1  # the error of samples left out flatters the one network that it
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """One network or the mean of several of one kind, in scaled quantities.
+    """One network or the mean of several of one kind, in scaled quantities."""
 
-    Attributes
-    ----------
-    members : tuple of Refined
-        The best one first.
-    """
-
-    members: tuple[Refined, ...]
+    members: tuple[Refined, ...]  # the best one first
 
     @property
     def networks(self) -> int:
@@ -68,17 +62,10 @@ class Ensemble:
 
 @dataclass(frozen=True, eq=False)
 class ScoredNetwork:
-    """A network and its errors at samples left out, computed in one or several ways.
-
-    Attributes
-    ----------
-    network : Refined
-        In scaled quantities.
-    misses : tuple of arrays
-        For each way the error of every row; the mean of networks misses the mean of these.
-    """
+    """A network in scaled quantities, and its errors at samples left out, computed in one or several ways."""
 
     network: Refined
+    # of every row, for each way; the mean of networks misses the mean of these
     misses: tuple[np.ndarray, ...]
 
 
@@ -93,16 +80,8 @@ def select_members(
 
     To the best network of a kind is added, one after another, the one with which the mean misses least (Caruana,
     Niculescu-Mizil, Crew & Ksikes 2004): one that errs elsewhere, where the next best often only grew from the best.
-    The mean is of as many as miss no more than a tenth more than the least.
-
-    Parameters
-    ----------
-    networks : sequence of ScoredNetwork
-        Those to choose from, of any kinds.
-    measure : callable
-        Returns the error of what a network misses.
-    most, units : int
-        Most members, and most units of all of them, images counted.
+    The mean is of as many as miss no more than a tenth more than the least, of `most` members and so many units at
+    most, images counted. `measure` makes one error of what a network misses.
     """
     kinds: dict[tuple[str, str], list[ScoredNetwork]] = defaultdict(list)
     for one in networks:

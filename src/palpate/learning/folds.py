@@ -16,14 +16,9 @@ _DISTANCES = 4_000_000  # in one block
 
 
 def near_places(X: np.ndarray) -> np.ndarray:
-    """Return the number (N,) of each sample's place; copies, exact or nearly, are at one place.
+    """Return the number (N,) of the place of each scaled sample X (N, n); copies, exact or nearly, are at one place.
 
     Samples are nearly copies where they are twenty times nearer to each other than a tenth neighbour typically is.
-
-    Parameters
-    ----------
-    X : (N, n) array
-        Scaled inputs.
     """
     exact, own = np.unique(X, axis=0, return_inverse=True)
     neighbours = min(_NEIGHBOURS, len(exact) // 4)
@@ -79,15 +74,8 @@ def _pairs_within(X: np.ndarray, reach: float) -> np.ndarray:
 def fold_numbers(groups: np.ndarray, folds: int, *, seed: int = 0) -> np.ndarray:
     """Return the fold (N,) of each sample, 0 to `folds` − 1 at most.
 
-    Parameters
-    ----------
-    groups : (N,) array
-        Samples of one group, such as the depths over one place, are in one fold. With fewer groups than folds each
-        group is a fold.
-    folds : int
-        Largest number of folds; they hold as many groups as each other, but for one.
-    seed : int
-        Decides how groups are dealt out. One seed for all networks: they are compared over the same folds.
+    Samples of one of the groups (N,), such as the depths over one place, are in one fold; with fewer groups than folds
+    each group is a fold. One seed deals for all networks: they are compared over the same folds.
     """
     _, own = np.unique(groups, return_inverse=True)
     order = np.random.default_rng(seed).permutation(int(own.max()) + 1)
@@ -103,18 +91,8 @@ def fold_masks(groups: np.ndarray, folds: int, *, seed: int = 0) -> list[np.ndar
 def held_out(places: np.ndarray, share: float, *, seed: int, fold: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Split samples in two: indices (N,) to learn from, in a random order, and a mask of those to judge by.
 
-    Samples at one place stay together, as far as two parts can be made: a copy of what was learnt judges nothing.
-
-    Parameters
-    ----------
-    places : (N,) array
-        Number of each sample's place; see `near_places`.
-    share : float
-        Of the places to judge by.
-    seed : int
-        Decides the shuffle.
-    fold : int
-        Number of the share of that shuffle; folds beyond the last begin again.
+    Samples at one of the `places` (N,) stay together, as far as two parts can be made: a copy of what was learnt judges
+    nothing. Held out is the `fold`-th share of the shuffled places; folds beyond the last begin again.
     """
     order = np.random.default_rng(seed).permutation(len(places))
     shuffled = places[order]

@@ -28,34 +28,16 @@ SHOWN = 400  # samples drawn at most
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The network after one observation.
+    """The network after one observation."""
 
-    Attributes
-    ----------
-    observation : int
-        Its number, counting from one over all passes.
-    centres, widths : (h, n) arrays
-        Centre of each unit in SI units, and its width along each axis, NaN where the form has none.
-    strengths : (h,) array
-        Size of each unit's weights over all outputs, in scaled outputs.
-    grew : (n,) array or None
-        Place of the unit that appeared, in SI units.
-    vanished : (k, n) array
-        Places at which units were that vanished, in SI units.
-    error : float
-        Error on held-out samples over full scale; without these, running mean error of the innovation.
-    curve : (81,) array or None
-        For one input: the answer in the output that is drawn, in SI units.
-    """
-
-    observation: int
-    centres: np.ndarray
-    widths: np.ndarray
-    strengths: np.ndarray
-    grew: np.ndarray | None
-    vanished: np.ndarray
-    error: float
-    curve: np.ndarray | None = None
+    observation: int  # its number, counting from one over all passes
+    centres: np.ndarray  # (h, n), of the units, SI units
+    widths: np.ndarray  # (h, n), along each axis, SI units; NaN where the form has none
+    strengths: np.ndarray  # (h,), size of each unit's weights over all outputs, in scaled outputs
+    grew: np.ndarray | None  # (n,), place of the unit that appeared, SI units
+    vanished: np.ndarray  # (k, n), places of the units that vanished, SI units
+    error: float  # on held-out samples over full scale; without these, running mean error of the innovation
+    curve: np.ndarray | None = None  # (81,), for one input: the answer in the output that is drawn, SI units
 
     @property
     def units(self) -> int:
@@ -65,35 +47,18 @@ class Frame:
 
 @dataclass(eq=False)
 class GrowthRecorder:
-    """Keeper of frames; it is told of every observation by the learner.
+    """Keeper of frames; it is told of every observation by the learner."""
 
-    Attributes
-    ----------
-    show : callable, optional
-        Called with the recorder after every observation, such as for a live view in a terminal.
-    frames : list of Frame
-        What was kept.
-    inputs, outputs : tuples
-        Names, units and ranges.
-    samples : (N, n), (N, m)
-        The samples, in SI units.
-    total : int
-        Observations of the whole run.
-    errors, counts : list
-        Error and number of units after every observation.
-    heldout : bool
-        True where errors are those on held-out samples.
-    """
-
-    show: Callable[[GrowthRecorder], None] | None = None
+    show: Callable[[GrowthRecorder], None] | None = None  # called with the recorder after every observation
     frames: list[Frame] = field(default_factory=list)
     inputs: tuple[Range, ...] = ()
     outputs: tuple[Quantity, ...] = ()
+    # (N, n) and (N, m), SI units
     samples: tuple[np.ndarray, np.ndarray] = (np.empty((0, 0)), np.empty((0, 0)))
-    total: int = 0
-    errors: list[float] = field(default_factory=list)
-    counts: list[int] = field(default_factory=list)
-    heldout: bool = False
+    total: int = 0  # observations of the whole run
+    errors: list[float] = field(default_factory=list)  # after every observation
+    counts: list[int] = field(default_factory=list)  # units after every observation
+    heldout: bool = False  # True where errors are those on held-out samples
     latest: Frame | None = None
     _scaling: Scaling | None = None
     _settings: Settings | None = None
@@ -110,23 +75,7 @@ class GrowthRecorder:
         *,
         heldout: bool,
     ) -> None:
-        """Take what a run is of, before its first observation.
-
-        Parameters
-        ----------
-        samples : (N, n), (N, m)
-            Inputs and outputs in SI units.
-        names : ranges and quantities
-            Names and units of the columns.
-        scaling : Scaling
-            Between these and the filter's scaled numbers.
-        settings : Settings
-            Rules of the filter.
-        total : int
-            Observations of the run.
-        heldout : bool
-            True if errors are those on held-out samples.
-        """
+        """Take what a run is of: samples X (N, n), Y (N, m) in SI units, their names, and the total of observations."""
         self.samples, self.total, self.heldout = samples, total, heldout
         self.inputs, self.outputs = tuple(names[0]), tuple(names[1])
         self._scaling, self._settings = scaling, settings
@@ -142,19 +91,7 @@ class GrowthRecorder:
         return np.linspace(self.inputs[0].low, self.inputs[0].high, CURVE)[:, None]
 
     def observe(self, state: State, event: Event, place: np.ndarray, error: float) -> None:
-        """Take the state after an observation at a scaled place (n,), and its error.
-
-        Parameters
-        ----------
-        state : State
-            The state after it.
-        event : Event
-            What the observation did.
-        place : (n,)
-            Where it was, scaled.
-        error : float
-            Error after it.
-        """
+        """Take the state after an observation at a scaled place (n,), what it did, and the error after it."""
         self.errors.append(float(error))
         self.counts.append(state.units)
         number = len(self.errors)

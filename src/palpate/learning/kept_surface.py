@@ -25,19 +25,8 @@ def touched_surface(
 ) -> TouchedSurface:
     """Return the distance of a surface: that which the dataset's store keeps, or a new one, which it keeps then.
 
-    Parameters
-    ----------
-    data : Dataset
-        Solves of the body; one that was not read from a store keeps nothing.
-    points, triangles : (P, 3), (t, 3) arrays
-        The touched surface at rest, in m.
-    radius, inner, shoulder : float
-        As `TouchedSurface.of` takes them, in m.
-
-    Raises
-    ------
-    UsageError
-        If the triangles make no surface.
+    The surface's points (P, 3) are at rest, in m, its triangles (t, 3); the lengths in m are those of
+    `TouchedSurface.of`. A dataset that was not read from a store keeps nothing.
     """
     lengths = {"radius": radius, "inner": inner, "shoulder": shoulder}
     digest = hashlib.sha256(f"{BUILT} {sorted(lengths.items())}".encode())

@@ -59,27 +59,13 @@ class Metric:
 
 @dataclass(frozen=True, eq=False)
 class KernelLayer:
-    """A fitted kernel layer in scaled quantities.
-
-    Attributes
-    ----------
-    metric : Metric
-        The kernel: its radial function, widths and ridge.
-    centres : (h, n)
-        Scaled inputs of the samples that carry a unit.
-    weights : (h, k)
-        Weights of the units for k outputs.
-    tail : (1 + n, k)
-        Coefficients of one and of the inputs.
-    noise : (h,) or float
-        Noise variance of each sample over the ridge.
-    """
+    """A fitted kernel layer in scaled quantities."""
 
     metric: Metric
-    centres: np.ndarray
-    weights: np.ndarray
-    tail: np.ndarray
-    noise: np.ndarray | float = 1.0
+    centres: np.ndarray  # (h, n), scaled inputs of the samples that carry a unit
+    weights: np.ndarray  # (h, k), for k outputs
+    tail: np.ndarray  # (1 + n, k), coefficients of one and of the inputs
+    noise: np.ndarray | float = 1.0  # (h,) or one number: noise variance of each sample over the ridge
 
     @classmethod
     def likely(

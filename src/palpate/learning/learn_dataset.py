@@ -81,13 +81,7 @@ class LearningHistory:
 
 
 def filter_record(history: Any) -> History | None:
-    """Return the record of the sequential filter in what a learner returned, where one ran.
-
-    Parameters
-    ----------
-    history : LearningHistory or History
-        What `palpate.learn` or a sequential learner returned beside the model; of anything else there is none.
-    """
+    """Return the record of the sequential filter in what a learner returned beside the model, where one ran."""
     own = history.filter if isinstance(history, LearningHistory) else history
     return own if isinstance(own, History) else None
 

@@ -25,11 +25,6 @@ def pad_solves(data: Dataset) -> Solves:
     """Return the converged solves of a body under one glued pad: displacement, then place, then further inputs.
 
     The ranges are widened to all images under the body's symmetry.
-
-    Raises
-    ------
-    UsageError
-        If the dataset's inputs are not the three components of one pad's displacement, and others.
     """
     data = data.ok
     own = [r.name.split()[-1] for r in data.ranges]

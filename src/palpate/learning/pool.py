@@ -38,16 +38,8 @@ R = TypeVar("R")
 class Pool:
     """Processes that carry out independent pieces of work.
 
-    Parameters
-    ----------
-    workers : int, optional
-        Number of processes. By default one for each core, at most eight, which are started after three seconds of
-        work: less is sooner done by this process alone.
-
-    Raises
-    ------
-    UsageError
-        If `workers` is below 1.
+    By default there is one for each core, at most eight, and they are started after three seconds of work: less is
+    sooner done by this process alone.
     """
 
     def __init__(self, workers: int | None = None) -> None:
@@ -62,17 +54,8 @@ class Pool:
     def map(self, work: Callable[[T], R], items: Sequence[T]) -> list[R]:
         """Return the result of `work` for each item, in their order.
 
-        Parameters
-        ----------
-        work : callable
-            A function of a module, or a method of a value that can be pickled; must not change anything.
-        items : sequence
-            One argument for each call.
-
-        Raises
-        ------
-        ResourceError
-            If a process ends before it has answered.
+        The work is a function of a module or a method of a value that can be pickled, and changes nothing. A process
+        that ends before it has answered is a `ResourceError`.
         """
         results: list[R] = []
         while len(results) < len(items) and self._alone(len(items) - len(results)):

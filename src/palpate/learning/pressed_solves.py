@@ -45,50 +45,28 @@ def _probe(data: Dataset) -> Mapping[str, Any] | None:
 
 @dataclass(frozen=True, eq=False)
 class PressedSolves:
-    """Solves of a body under a probe, and what is known of them.
+    """Solves of a body under a probe, and what is known of them."""
 
-    Attributes
-    ----------
-    data : Dataset
-        Converged rows.
-    radius : float
-        Of the probe, m; where it is an input, the middle of its range.
-    radius_input : int or None
-        The input that it is.
-    inputs : n ranges
-        Those of the data, widened to all mirror images.
-    surface : TouchedSurface
-        The surface that the probe touches, with its signed distance.
-    points, triangles : (P, 3), (t, 3) arrays
-        The body's whole surface, of a mesh that is fine wherever it is touched.
-    matrices, about : (k, 3, 3), (3,) arrays
-        The body's symmetry, the identity among it.
-    resolved : float or None
-        Depth at which a contact is as wide as an element, m; None for elements of the usual size.
-    deepest : float
-        Depth that the solves were made to, m; 0 where the provenance does not tell.
-    """
-
-    data: Dataset
-    radius: float
-    radius_input: int | None
-    inputs: tuple[Range, ...]
-    surface: TouchedSurface
+    data: Dataset  # converged rows
+    radius: float  # of the probe, m; where it is an input, the middle of its range
+    radius_input: int | None  # the input that it is
+    inputs: tuple[Range, ...]  # those of the data, widened to all mirror images
+    surface: TouchedSurface  # that the probe touches
+    # (P, 3), m, of the body's whole surface, of a mesh that is fine wherever it is touched
     points: np.ndarray
-    triangles: np.ndarray
-    matrices: np.ndarray
-    about: np.ndarray
+    triangles: np.ndarray  # (t, 3)
+    matrices: np.ndarray  # (k, 3, 3), the body's symmetry, the identity among it
+    about: np.ndarray  # (3,), the point that stays, m
+    # depth at which a contact is as wide as an element, m; None for elements of the usual size
     resolved: float | None
-    deepest: float
+    deepest: float  # depth that the solves were made to, m; 0 where the provenance does not tell
 
     @classmethod
     def of(cls, data: Dataset, layout: Layout | None = None) -> PressedSolves:
-        """From a sweep; `layout` is of a mesh that is fine wherever the body shall be touched, by default the sweep's.
+        """Return the solves of a sweep.
 
-        Raises
-        ------
-        UsageError
-            If the data is of no body under one probe, lacks energies or forces, or too few solves converged.
+        A `layout` is of a mesh that is fine wherever the body shall be touched, where the sweep's is fine in a part
+        only.
         """
         probe = _checked_probe(data)
         data = data.ok
@@ -147,17 +125,8 @@ class PressedSolves:
     def snapshots(self, name: str, *, seed: int = 0, most: int = MOST) -> list[Snapshots]:
         """Return a field of all solves as they are and at their mirror images, each on its own nodes.
 
-        u(M c)(M X) = M u(c)(X): vectors turn with the body, numbers stay the same. Of too many images whole depth
-        series are drawn at random.
-
-        Parameters
-        ----------
-        name : str
-            The field's name in the dataset.
-        seed : int
-            Decides what is drawn.
-        most : int
-            Number of shapes beyond which images are drawn.
+        u(M c)(M X) = M u(c)(X): vectors turn with the body, numbers stay the same. Of more than `most` shapes whole
+        depth series are drawn at random, which the seed decides.
         """
         data, series = self.data, self.depth_series
         nodes, own = np.unique(data.triangles, return_inverse=True)

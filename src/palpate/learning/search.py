@@ -49,28 +49,14 @@ _LEAST = 0.1  # s that a refinement gets when time is over and nothing was found
 
 @dataclass(frozen=True)
 class Budget:
-    """The work and the time that a search may take.
+    """The work and the time that a search may take."""
 
-    Attributes
-    ----------
-    effort : float
-        Multiplies the counts of candidates, iterations and sizes; 1 is the default work, 0.1 a quick look.
-    deadline : float
-        Of `time.monotonic`, infinite without a limit on time.
-    """
-
-    effort: float = 1.0
-    deadline: float = math.inf
+    effort: float = 1.0  # multiplies the counts of candidates, iterations and sizes; 0.1 is a quick look
+    deadline: float = math.inf  # of `time.monotonic`; infinite without a limit on time
 
     @classmethod
     def of(cls, effort: float = 1.0, seconds: float | None = None) -> Budget:
-        """Return a budget that begins now; `seconds` limits its time.
-
-        Raises
-        ------
-        UsageError
-            If the effort or the limit is not a positive number.
-        """
+        """Return a budget that begins now; `seconds` limits its time."""
         for name, value in (("effort", effort), ("seconds", 1.0 if seconds is None else seconds)):
             plain = isinstance(value, (int, float, np.number)) and not isinstance(value, (bool, np.bool_))
             if not plain or not 0 < value < math.inf:
@@ -107,15 +93,8 @@ class Budget:
 class Work:
     """The multiplications that a search has left, by which it decides what it still begins.
 
-    Under a limit on time they are no more than what can be done until then at the pace so far, so that a step that
-    would last too long is not begun. Without one no clock is asked.
-
-    Parameters
-    ----------
-    total : float
-        Multiplications.
-    deadline : float
-        Of `time.monotonic`.
+    Under a limit on time, the `deadline` of `time.monotonic`, they are no more than what can be done until then at the
+    pace so far, so that a step that would last too long is not begun. Without one no clock is asked.
     """
 
     def __init__(self, total: float, deadline: float = math.inf) -> None:
@@ -146,14 +125,7 @@ class Work:
 def iteration_work(rows: int, numbers: int, units: int, modes: int = 1) -> float:
     """Return the multiplications of one iteration of a refinement, or what takes as long.
 
-    Parameters
-    ----------
-    rows : int
-        Samples, and their slopes and curvatures.
-    numbers, units : int
-        Unknowns θ, and units that they are of.
-    modes : int
-        Outputs.
+    Rows are samples with their slopes and curvatures; `numbers` are the unknowns θ of the units, `modes` the outputs.
     """
     matrices = rows * numbers**2 + numbers**3 / 3 + 4 * rows * units**2 + 2 * rows * units * modes
     return matrices + _FUNCTIONS * rows * numbers + _CALLS
@@ -192,35 +164,16 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Units to refine from, or the network that was refined from them.
+    """Units to refine from, or the network that was refined from them."""
 
-    Attributes
-    ----------
-    regressors : Regressors
-        The kind of the units, and the tail.
-    theta : (h, p) array
-        The units now.
-    start : str
-        Where they came from.
-    error : float
-        By which candidates are compared; infinite before a candidate was evaluated.
-    network : Refined or None
-        The network after refinement; None before a candidate was evaluated.
-    iterations : int
-        Spent so far.
-    seconds : float
-        The same.
-    detail : object
-        What the problem wants to remember of the evaluation, such as the error of every sample.
-    """
-
-    regressors: Regressors
-    theta: np.ndarray
-    start: str
-    error: float = math.inf
-    network: Refined | None = None
-    iterations: int = 0
-    seconds: float = 0.0
+    regressors: Regressors  # kind of the units, and the tail
+    theta: np.ndarray  # (h, p), the units now
+    start: str  # where they came from
+    error: float = math.inf  # by which candidates are compared
+    network: Refined | None = None  # None before the candidate was evaluated
+    iterations: int = 0  # spent so far
+    seconds: float = 0.0  # spent so far
+    # what the problem wants to remember of the evaluation, such as the error of every sample
     detail: Any = None
 
     @property
@@ -248,24 +201,12 @@ class Searchable(Protocol):
 
 @dataclass(eq=False)
 class Search:
-    """A search, and all that it has tried.
+    """A search, and all that it has tried."""
 
-    Attributes
-    ----------
-    problem : Searchable
-        The problem, which evaluates candidates.
-    budget : Budget
-        Effort, and the limit on time.
-    pool : Pool, optional
-        Processes that evaluate candidates; this one alone if left out.
-    tried : list of Candidate
-        In order, each with as many iterations as it got.
-    """
-
-    problem: Searchable
+    problem: Searchable  # evaluates candidates
     budget: Budget = field(default_factory=Budget)
-    pool: Pool | None = None
-    tried: list[Candidate] = field(default_factory=list)
+    pool: Pool | None = None  # processes that evaluate candidates; None for this one alone
+    tried: list[Candidate] = field(default_factory=list)  # in order, each with as many iterations as it got
 
     @property
     def best(self) -> Candidate:
@@ -324,24 +265,10 @@ class Search:
     ) -> Candidate | None:
         """Return the best network of sizes upwards.
 
-        Parameters
-        ----------
-        starts : callable
-            Returns candidates of a number of units, given the best network so far.
-        ladder : iterable of int
-            Numbers of units, upwards.
-        iterations : int
-            For each candidate.
-        begin : Candidate, optional
-            The best network before the first size.
-        target : float
-            Error at which to stop.
-        patience : int, optional
-            Sizes in a row without a gain after which to stop; by default never.
-        gain : float
-            Ratio to the best error below which an error is a gain.
-        judge : callable, optional
-            Measures the winner of each size anew, by what sizes are then compared.
+        For each number of units of the ladder `starts` gives candidates, from the best network so far; `begin` is the
+        best before the first size. It ends at the error `target`, or after so many sizes in a row as `patience` without
+        a gain: an error below `gain` times the best. `judge` measures the winner of each size anew, by what sizes are
+        then compared.
         """
         best = begin
         idle = 0

@@ -22,22 +22,9 @@ def random_units(
     widths: tuple[float, float] = (0.2, 1.0),
     scatter: float = 0.0,
 ) -> np.ndarray:
-    """Return units (count, p) at samples drawn from X (N, n).
+    """Return units (count, p) at samples drawn from scaled inputs X (N, n), scattered about them by that deviation.
 
-    Parameters
-    ----------
-    form : Form
-        The form of the units.
-    X : (N, n) array
-        Scaled inputs.
-    count : int
-        Number of units.
-    rng : Generator
-        Draws places, widths and directions.
-    widths : (float, float)
-        Least and largest width, of a uniform logarithm, in scaled inputs.
-    scatter : float
-        Standard deviation of the units' places about the samples.
+    The logarithm of a width is uniform between those of the least and the largest, in scaled inputs.
     """
     places = X[rng.integers(len(X), size=count)] + rng.normal(0.0, 1.0, (count, X.shape[1])) * scatter
     sigma = np.exp(rng.uniform(math.log(widths[0]), math.log(widths[1]), count))
@@ -68,22 +55,9 @@ def units_at_errors(
 ) -> np.ndarray:
     """Return units (k, p) of given widths (k,), one after another at the sample of the largest error, far from others.
 
-    Parameters
-    ----------
-    form : Form
-        The form of the units.
-    X : (N, n) array
-        Scaled inputs.
-    error : (N,) array
-        Squared error at each; it counts times the squared distance to the nearest new unit.
-    widths : (k,) array
-        Width of each new unit, in scaled inputs.
-    spacing : float
-        Distance beyond which there is no gain.
-    seeds : k ints, optional
-        Of directions where the form has them; drawn if left out.
-    rng : Generator, optional
-        Draws samples in proportion to what counts, in place of the largest.
+    The squared error (N,) at each scaled input X (N, n) counts times the squared distance to the nearest new unit, up
+    to `spacing`, beyond which there is no gain. With `rng` samples are drawn in proportion to that, in place of the
+    largest. `seeds` decide directions where the form has them.
     """
     distance = np.full(len(X), spacing**2)
     units = []

@@ -148,13 +148,7 @@ def load_archive(path: str | os.PathLike[str], *, kind: str | None = None) -> Ar
 
 
 def load_single_network(path: str | os.PathLike[str]) -> Network:
-    """The only network of an archive.
-
-    Raises
-    ------
-    FileFormatError
-        As `load_archive`, or if the archive holds more or less than one network.
-    """
+    """Return the only network of an archive, read as `load_archive` does; more or fewer than one are refused."""
     networks = load_archive(path, kind=Archive.kind).networks
     if len(networks) != 1:
         raise FileFormatError(
@@ -189,7 +183,7 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def network_to_json(network: Network) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """The JSON description of a network, and its arrays by name."""
+    """Return the JSON description of a network, and its arrays by name."""
     parts = {k: getattr(network, k) for k in _PARTS} | {k: getattr(network.scaling, k) for k in _SCALES}
     if network.basis is not None:
         parts["basis"] = network.basis
@@ -209,13 +203,7 @@ def network_to_json(network: Network) -> tuple[dict[str, Any], dict[str, np.ndar
 def _network_from_json(
     description: Mapping[str, Any], arrays: Mapping[str, np.ndarray], *, old: bool = False
 ) -> Network:
-    """The network of a description and exactly its arrays; `old` ones don't mention kernel and basis.
-
-    Raises
-    ------
-    ValueError, TypeError, UsageError
-        If anything is missing, too much, or not what it must be.
-    """
+    """Return the network of a description and exactly its arrays; `old` ones don't mention kernel and basis."""
     _exactly(description, _KEYS if old else _KEYS | _KEYS_SINCE_2)
     if old:
         description = {**description, "radial": "gaussian", "basis": False, "extras": []}

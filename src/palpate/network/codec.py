@@ -38,13 +38,7 @@ import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.network.archive import Archive, load_archive, save_archive
-from palpate.network.kinds import (
-    UnknownKindError,
-    import_next,
-    registered_kinds,
-    registrations,
-    same_class,
-)
+from palpate.network.kinds import UnknownKindError, import_next, registered_kinds, registrations, same_class
 from palpate.network.network import Network
 from palpate.network.packing import pack, unpack
 

@@ -33,30 +33,18 @@ __all__ = ["MAKE_ANEW", "Container", "read_container", "write_container"]
 
 VERSION = 2
 MAKE_ANEW = "Copy the file again, or make it anew with `palpate learn`."
-_HEADER_MAX = 100_000_000  # bytes, of safetensors
+_HEADER_MAX = 100_000_000  # bytes of a header, as safetensors allows
 _KINDS = {"BOOL", "U8", "I8", "U16", "I16", "U32", "I32", "U64", "I64", "F16", "F32", "F64"}
 
 
 @dataclass(frozen=True, eq=False)
 class Container:
-    """The raw parts of one file.
+    """The raw parts of one file."""
 
-    Attributes
-    ----------
-    kind : str
-        The sort of thing that the file holds.
-    content : str
-        JSON text.
-    tensors : mapping of name to array
-        Arrays of plain numbers by name.
-    version : str
-        Of the layout, "1" to the latest.
-    """
-
-    kind: str
-    content: str
-    tensors: Mapping[str, np.ndarray]
-    version: str = str(VERSION)
+    kind: str  # the sort of thing that the file holds
+    content: str  # JSON text
+    tensors: Mapping[str, np.ndarray]  # arrays of plain numbers by name
+    version: str = str(VERSION)  # version of the layout, "1" to the latest
 
     @property
     def header(self) -> dict[str, str]:
@@ -75,14 +63,9 @@ class Container:
 
 
 def write_container(path: str | os.PathLike[str], container: Container) -> Path:
-    """Write a container; the file appears whole or not at all.
+    """Write a container; the file appears whole or not at all, and replaces none but an archive of palpate's.
 
-    Raises
-    ------
-    UsageError
-        If the folder does not exist, or a file of that name is no archive of palpate's.
-    ResourceError
-        If the disk is full, or the folder write-protected.
+    A full disk or a write-protected folder ends in a ResourceError.
     """
     from safetensors.numpy import save
 
@@ -97,13 +80,7 @@ def write_container(path: str | os.PathLike[str], container: Container) -> Path:
 
 
 def read_container(path: str | os.PathLike[str]) -> Container:
-    """Read a container back, bit for bit.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is missing, truncated, corrupt, foreign or from a later version.
-    """
+    """Read a container back, bit for bit; refuse one that is truncated, corrupt, foreign or of a later version."""
     path = Path(path)
     header, tensors = _read(path)
     if not {"palpate", "version", "content"} <= header.keys():

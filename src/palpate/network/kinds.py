@@ -83,10 +83,7 @@ def outside_modules() -> tuple[str, ...]:
 def import_when_needed(modules: Iterable[str]) -> None:
     """Let files of kinds that this process does not know import these modules, one after the other.
 
-    Parameters
-    ----------
-    modules : iterable of str
-        Such as `outside_modules` of the process that started this one.
+    They are, for example, the `outside_modules` of the process that started this one.
     """
     _not_imported.extend(modules)
 

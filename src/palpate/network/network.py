@@ -30,11 +30,7 @@ from palpate.network.soundness import check_shapes, unreal
 from palpate.tables import column_names, columns_in_order
 from palpate.units import Quantity, Range, bounds
 
-__all__ = [
-    "Evaluator",
-    "Network",
-    "Scaling",
-]
+__all__ = ["Evaluator", "Network", "Scaling"]
 
 
 @dataclass(frozen=True, eq=False)

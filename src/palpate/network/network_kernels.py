@@ -71,15 +71,10 @@ def pattern(factors: np.ndarray) -> np.ndarray:
 
 
 def packed(network: Network, precision: Precision) -> tuple[np.ndarray, ...]:
-    """A network's numbers as kernels read them: (layout, scales, units, rows, modes, constants).
+    """Return a network's numbers as kernels read them: (layout, scales, units, rows, modes, constants).
 
-    The inputs are scaled in double precision in either case: where a range is narrow beside its distance from
-    zero, single precision could not tell its points apart.
-
-    Raises
-    ------
-    UsageError
-        If there is no such precision.
+    The inputs are scaled in double precision in either case: where a range is narrow beside its distance from zero,
+    single precision could not tell its points apart.
     """
     if precision not in PRECISIONS:
         raise UsageError(
@@ -113,7 +108,7 @@ def workspace(parts: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:
 
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
-_SMALL = 8  # outputs: fewer are summed in registers, more along the rows
+_SMALL = 8  # number of outputs: fewer are summed in registers, more along the rows
 
 
 @_jit
@@ -347,12 +342,9 @@ def hessian_into(x, H, one, slopes, work, steps, layout, scales, units, rows, mo
 
 
 def gram(network: Network, q: int) -> np.ndarray:
-    """Entries i ≤ j of A_kᵀA_k for the first q inputs, row by row, (q (q + 1)/2, h).
+    """Return the entries i ≤ j of A_kᵀA_k for the first q inputs, row by row, (q (q + 1)/2, h).
 
-    Raises
-    ------
-    UsageError
-        If the network has several outputs or a basis, or fewer than q inputs.
+    Networks of several outputs, with a basis, or of fewer than q inputs are refused.
     """
     if len(network.outputs) != 1 or network.basis is not None or not 1 <= q <= len(network.inputs):
         raise UsageError(

@@ -16,12 +16,12 @@ from palpate.sizes import require_deflated
 
 __all__ = ["pack", "unpack", "whole_multiples"]
 
-LEVEL = 1  # of zlib: the fastest; higher ones gain a few percent
-WHOLE_LEVEL = 6  # the same of whole numbers, which are a third as many bytes
-BITS = 31  # of a whole number
-_HEAD = struct.Struct("<Bh")  # of whole multiples: the mark and the exponent
-_MARK = 1
-_FEW = 1000  # numbers that tell most tables from multiples
+LEVEL = 1  # level of zlib: the fastest; higher ones gain a few percent
+WHOLE_LEVEL = 6  # level of zlib for whole numbers, which are a third as many bytes
+BITS = 31  # bits of a whole number
+_HEAD = struct.Struct("<Bh")  # head of a table of whole multiples: the mark and the exponent
+_MARK = 1  # first byte of a table of whole multiples
+_FEW = 1000  # numbers that tell most tables from those of multiples
 
 
 def whole_multiples(table: np.ndarray) -> tuple[np.ndarray, int] | None:
@@ -59,13 +59,7 @@ def pack(table: np.ndarray) -> np.ndarray:
 
 
 def unpack(packed: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the array of float64 of a known shape, bit for bit what was packed.
-
-    Raises
-    ------
-    ValueError
-        If the bytes are not those of such an array.
-    """
+    """Return the array of float64 of a known shape, bit for bit what was packed; other bytes raise a ValueError."""
     data = packed.tobytes()
     if data[:1] != bytes([_MARK]):
         return _inflate(data, shape, "<f8").astype(np.float64)
@@ -75,9 +69,8 @@ def unpack(packed: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     whole = ((folded >> 1) & np.int32(2**31 - 1)) ^ -(folded & 1)
     for axis in reversed(range(len(shape))):
         whole = np.cumsum(whole, axis=axis, dtype=np.int32)
-    with np.errstate(
-        over="ignore"
-    ):  # what is too large becomes infinite, for the reader of the table to refuse
+    # a number that is too large becomes infinite, for the reader of the table to refuse
+    with np.errstate(over="ignore"):
         return np.asarray(np.ldexp(whole.astype(np.float64), _HEAD.unpack_from(data)[1]))
 
 

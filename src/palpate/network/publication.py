@@ -42,13 +42,7 @@ _HEAD = 8  # serial, h, r, k, whether there is a basis, radial function; two to 
 
 
 def _create(text: Mapping[str, Any]) -> _Memory:
-    """Make the memory that `text` describes.
-
-    Raises
-    ------
-    OSError
-        If there is no room for it.
-    """
+    """Make the memory that `text` describes; an OSError says that there is no room for it."""
     content = json.dumps(text).encode()
     head = bytearray(_MAGIC.ljust(_TEXT, b"\0") + content)
     head[_LENGTH : _LENGTH + 8] = np.int64(len(content)).tobytes()
@@ -145,7 +139,7 @@ class Publisher:
 
         Parameters
         ----------
-        inputs, outputs
+        inputs, outputs : sequences of Range and of Quantity
             Of every network that will be published.
         units, rank, modes : int
             Capacities; rank is n unless given, and without modes only networks without a basis are taken.
@@ -241,7 +235,7 @@ class Subscriber:
     ----------
     name : str
         `Publisher.name`.
-    precision, jacobian
+    precision, jacobian : str, bool
         Of the evaluator, see `Network.evaluator`.
 
     Attributes

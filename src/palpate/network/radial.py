@@ -74,7 +74,7 @@ def third(name: RadialFunction, q: np.ndarray) -> np.ndarray:
 
 
 Q, T, P, D1, D2, HEAD = 0, 1, 2, 3, 4, 5
-DEGREE = 13
+DEGREE = 13  # degree of the Taylor polynomial of the exponential
 _GAUSSIAN, _MULTIQUADRIC = 0, 1  # places in RADIAL_FUNCTIONS
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")

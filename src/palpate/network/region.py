@@ -19,8 +19,8 @@ __all__ = ["TrainedRegion"]
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 _DOUBLE = np.dtype(np.float64)
-_MOST = 512  # points kept: a few microseconds per query
-_MANY = 20_000  # inputs of which points are chosen; of more, some at random
+_MOST = 512  # points kept, at most: a query takes a few microseconds
+_MANY = 20_000  # inputs of which points are chosen; of more, so many are drawn at random
 _TYPICAL = 0.99  # share of the data's own nearest-neighbour distances that a radius covers
 
 

@@ -20,13 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = [
-    "Block",
-    "attach",
-    "create",
-    "folder",
-    "remove",
-]
+__all__ = ["Block", "attach", "create", "folder", "remove"]
 
 _RAM = Path("/dev/shm")
 
@@ -39,10 +33,7 @@ def folder() -> Path:
 def create(head: bytes, size: int) -> str:
     """Make a file of `size` bytes that begins with `head`, readable by its owner alone; its path is its name.
 
-    Raises
-    ------
-    OSError
-        If there is no room for it.
+    An OSError says that there is no room for it.
     """
     handle, name = tempfile.mkstemp(prefix="palpate-", suffix=".shm", dir=folder())
     try:
@@ -58,10 +49,7 @@ def create(head: bytes, size: int) -> str:
 def attach(name: str, head: bytes, size: int = 0) -> mmap.mmap:
     """Map the file of that name, which begins with `head` and, unless 0, is `size` bytes long.
 
-    Raises
-    ------
-    OSError, ValueError
-        If there is none, nothing in it, or something else.
+    An OSError says that there is none, a ValueError that it is empty or something else.
     """
     with Path(name).open("r+b") as file:
         memory = mmap.mmap(file.fileno(), 0)

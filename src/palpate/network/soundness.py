@@ -18,13 +18,7 @@ LARGEST = 1e100  # its square, times any sensible number of terms, is still far 
 
 
 def check_shapes(network: Network) -> None:
-    """Refuse parts that do not fit together.
-
-    Raises
-    ------
-    UsageError
-        If a shape is not what the units and outputs ask for.
-    """
+    """Refuse parts whose shapes are not what a network's units, inputs and outputs ask for."""
     if network.factors.ndim != 3 or not network.inputs or not network.outputs:
         raise UsageError(
             f"A network of {len(network.inputs)} inputs, {len(network.outputs)} outputs and factors of shape "

@@ -26,22 +26,11 @@ def slopes_by_factors(
     A: np.ndarray,
     pattern: Pattern | None,
 ) -> Derivatives:
-    """∂φ_k/∂x_i (N, n, h), and its derivatives by A's entries (N, n, h, e) and by b (N, n, h, r).
+    """Return ∂φ_k/∂x_i (N, n, h), and its derivatives by A's entries (N, n, h, e) and by b (N, n, h, r).
 
-    Parameters
-    ----------
-    points : (c, N, n)
-        Images of the samples.
-    turns : (c, n, n)
-        G of each.
-    v : (c, N, h, r)
-        A_k x − b_k.
-    g : two of (c, N, h)
-        g' and g''.
-    A : (h, r, n)
-        Factors of the units.
-    pattern : two of (e,) int, optional
-        Rows and columns of A's entries; without it the derivatives by A and b are left out.
+    `points` (c, N, n) are the images of the samples, and `turns` (c, n, n) the G of each; v (c, N, h, r) is A_k x − b_k
+    with the units' factors A (h, r, n), and g holds g' and g'', (c, N, h) each. The pattern gives rows and columns (e,)
+    of A's entries; without it the derivatives by A and b are left out.
     """
     found = _blank(v, points.shape[2], pattern)
     _slopes_into(points, turns, v, g, A, pattern or _NO_PATTERN, found)

@@ -20,37 +20,20 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = [
-    "Centred",
-    "Form",
-    "Oblique",
-    "Widths",
-    "chain_of",
-    "unit_form",
-]
+__all__ = ["Centred", "Form", "Oblique", "Widths", "chain_of", "unit_form"]
 
 Widths = Literal["log", "plain"]
 
 
 class Form(Protocol):
-    """The contract of a form: p numbers θ_k of a unit make its factor A_k (r, n) and shift b_k (r,).
+    """The contract of a form: p numbers θ_k of a unit make its factor A_k (r, n) and shift b_k (r,)."""
 
-    Attributes
-    ----------
-    name : str
-        As `unit_form` takes it.
-    inputs, rank, size : int
-        n, r and p.
-    rows, columns : (e,) int
-        Pattern: the entries of A that may differ from zero.
-    """
-
-    name: str
-    inputs: int
-    rank: int
-    size: int
-    rows: np.ndarray
-    columns: np.ndarray
+    name: str  # as `unit_form` takes it
+    inputs: int  # n, inputs of the map
+    rank: int  # r, rows of a factor
+    size: int  # p, numbers of a unit
+    rows: np.ndarray  # (e,) int, row of each entry of A that may differ from zero: the pattern
+    columns: np.ndarray  # (e,) int, column of each of these entries
 
     def factors(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A (h, r, n) and b (h, r) of units θ (h, p)."""
@@ -80,13 +63,7 @@ def chain_of(form: Form, theta: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def unit_form(name: str, inputs: int, widths: Widths = "log") -> Form:
-    """A form by name for n inputs: isotropic, axis-aligned, rotated, rank-1, rank-2, ….
-
-    Raises
-    ------
-    UsageError
-        If there is no such form, or the rank is not between 1 and n.
-    """
+    """Return a form by name for n inputs: isotropic, axis-aligned, rotated, rank-1, rank-2, … up to rank n."""
     if name in {"isotropic", "axis-aligned", "rotated"}:
         return Centred(name, inputs, widths)
     rank = name.removeprefix("rank-")

@@ -11,7 +11,7 @@ import numpy as np
 
 __all__ = ["every_mode", "leading_modes", "output_modes"]
 
-_ROUND_OFF = 1e-15  # modes below this share of the largest are round-off
+_ROUND_OFF = 1e-15  # share of the largest mode, below which modes are round-off
 
 
 def every_mode(Y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -26,19 +26,10 @@ from numba import njit
 
 from palpate.errors import UsageError
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction, radial, third
-from palpate.rbf.derivative_kernels import (
-    Derivatives,
-    Pattern,
-    curvatures_by_factors,
-    slopes_by_factors,
-)
+from palpate.rbf.derivative_kernels import Derivatives, Pattern, curvatures_by_factors, slopes_by_factors
 from palpate.rbf.forms import Form, chain_of
 
-__all__ = [
-    "Regressors",
-    "Tail",
-    "pairs",
-]
+__all__ = ["Regressors", "Tail", "pairs"]
 
 Tail = Literal["affine", "constant", "none"]
 
@@ -53,26 +44,11 @@ def pairs(inputs: int) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class Regressors:
-    """Units of one form and radial function, and a tail.
-
-    Attributes
-    ----------
-    form : Form
-        Of every unit.
-    radial : {"gaussian", "inverse-multiquadric", "matern-5/2"}
-        Radial function g.
-    tail : {"affine", "constant", "none"}
-        T·[1, x], T, or nothing.
-
-    Raises
-    ------
-    UsageError
-        If there is no such radial function or tail.
-    """
+    """Units of one form and radial function, and a tail."""
 
     form: Form
-    radial: RadialFunction = "gaussian"
-    tail: Tail = "affine"
+    radial: RadialFunction = "gaussian"  # radial function g of every unit
+    tail: Tail = "affine"  # T·[1, x], T, or nothing
 
     def __post_init__(self) -> None:
         for what, name, known in (

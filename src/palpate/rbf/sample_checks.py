@@ -12,33 +12,13 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.tables import numbers_of
 
-__all__ = [
-    "numbers",
-    "relative_error",
-    "samples",
-    "second_derivatives",
-    "spread_of",
-]
+__all__ = ["numbers", "relative_error", "samples", "second_derivatives", "spread_of"]
 
 
 def numbers(what: str, given: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> np.ndarray:
-    """An array of real numbers as float64; None in `shape` is any length but zero.
+    """Return an array of real numbers, finite if they must be, as float64; None in `shape` is any length but zero.
 
-    Parameters
-    ----------
-    what : str
-        Its name, as the message begins.
-    given : array-like
-        The numbers to check.
-    shape : tuple of int or None
-        Length along each axis.
-    finite : bool
-        Whether infinities and not-a-number are refused.
-
-    Raises
-    ------
-    UsageError
-        If it holds anything but real numbers, has another shape, or is not finite.
+    `what` is its name, as the message of a UsageError begins.
     """
     found = numbers_of(what, given)
     fits = found.ndim == len(shape) and all(
@@ -67,38 +47,12 @@ def samples(
     outputs: int | None = None,
     fewest: int = 1,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, np.ndarray]:
-    """N samples as float64 arrays that fit together.
+    """Return N samples as float64 arrays that fit together: X, Y, weights, slopes or None, slope weights.
 
-    Samples of no weight, and slopes of no weight, count for nothing and need not be finite.
-
-    Parameters
-    ----------
-    X : (N, n)
-        Inputs, one row a sample.
-    Y : (N, m)
-        Outputs of the same samples.
-    weights : (N,), optional
-        Not negative, one positive; ones if left out.
-    slopes : (N, m, n), optional
-        ∂Y/∂X.
-    slope_weight : float, (N,) or (N, n)
-        Not negative; counts only where there are slopes.
-    inputs, outputs : int, optional
-        n and m, where they are known.
-    fewest : int
-        Least N.
-
-    Returns
-    -------
-    X, Y, weights : (N, n), (N, m), (N,)
-    slopes : (N, m, n) or None
-    slope_weight : (N,) or (N, n)
-        Zeros without slopes.
-
-    Raises
-    ------
-    UsageError
-        If anything does not fit, or a number that counts is not finite.
+    X (N, n) and Y (N, m) are inputs and outputs, one row a sample; n and m may be known, and N is at least `fewest`.
+    The weights (N,) are not negative and one is positive; by default they are ones. Slopes (N, m, n) are ∂Y/∂X, and
+    their weights, one number, (N,) or (N, n), are not negative; without slopes they come back as zeros. Samples of no
+    weight, and slopes of no weight, count for nothing and need not be finite.
     """
     X = numbers("Inputs X", X, (None, inputs), finite=False)
     Y = numbers("Outputs Y", Y, (None, outputs), finite=False)
@@ -135,28 +89,10 @@ def samples(
 def second_derivatives(
     curvatures: Any, curvature_weight: Any, weights: np.ndarray, *, inputs: int, outputs: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Second derivatives of N samples, and their weights, as float64 arrays that fit the samples.
+    """Return the second derivatives of N samples, and their weights, as float64 arrays that fit the samples.
 
-    Parameters
-    ----------
-    curvatures : (N, m, n(n+1)/2)
-        ∂²y/∂x_i∂x_j, i ≤ j; those of no weight need not be finite.
-    curvature_weight : float, (N,) or (N, n(n+1)/2)
-        Not negative.
-    weights : (N,)
-        Of the samples.
-    inputs, outputs : int
-        n and m.
-
-    Returns
-    -------
-    curvatures : (N, m, n(n+1)/2)
-    curvature_weight : (N,) or (N, n(n+1)/2)
-
-    Raises
-    ------
-    UsageError
-        If anything does not fit, or a number that counts is not finite.
+    Curvatures (N, m, n(n+1)/2) are ∂²y/∂x_i∂x_j, i ≤ j, with weights ≥ 0 of one number, (N,) or (N, n(n+1)/2), and come
+    back so; those of no weight, their own or of the samples' `weights` (N,), need not be finite.
     """
     N, count = len(weights), inputs * (inputs + 1) // 2
     c = _weights("Curvature weights", curvature_weight, N, count)

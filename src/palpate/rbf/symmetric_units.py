@@ -20,28 +20,15 @@ from palpate.rbf.regressors import Regressors, pairs
 
 __all__ = ["Images", "SymmetricRegressors"]
 
-_SAME = 1e-9  # of scaled inputs: round-off of a declared matrix
+_SAME = 1e-9  # difference of scaled inputs that is round-off of a declared matrix
 
 
 @dataclass(frozen=True, eq=False)
 class Images:
-    """The maps x ↦ G x + t of a group, on scaled inputs.
+    """The maps x ↦ G x + t of a group, on scaled inputs; two in succession are again one of them."""
 
-    Attributes
-    ----------
-    turns : (c, n, n)
-        G.
-    shifts : (c, n)
-        t.
-
-    Raises
-    ------
-    UsageError
-        If the maps are no group: two in succession must be one of them.
-    """
-
-    turns: np.ndarray
-    shifts: np.ndarray
+    turns: np.ndarray  # (c, n, n), the matrices G
+    shifts: np.ndarray  # (c, n), the shifts t
 
     def __post_init__(self) -> None:
         maps = self.homogeneous
@@ -77,12 +64,9 @@ class Images:
 
 @dataclass(frozen=True)
 class SymmetricRegressors(Regressors):
-    """Regressors of units with their images, and of the tail that the images leave as it is.
+    """Regressors of units with their images, and of the tail that the images of a group leave as it is.
 
-    Attributes
-    ----------
-    images : Images
-        Of the group; the number of units is that of orbits.
+    The number of units is that of orbits.
     """
 
     images: Images | None = None

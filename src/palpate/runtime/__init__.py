@@ -6,10 +6,10 @@
     realtime, loop_report             punctuality, and how well it was kept
     safety, passivity                 what may reach a hand
     stability, coupling               how stiff a body may feel, and the spring in front of one that is stiffer
-    workspace, devices                where the hand is
+    workspace                         where the hand is, whose device `palpate.devices` reads
     touchable, hand_evaluator         what it is laid on, and what answers it
     recording, recorder, snapshot     every tick on its way into a file, from any moment on
-    trace_file, trace_export          that file, and tables made of it
+    trace_export                      tables made of that file
     replay                            the same loop on recorded samples
 
 Names are loaded when asked for, so that the loop's process imports nothing it doesn't need.

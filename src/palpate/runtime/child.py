@@ -16,9 +16,10 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 
+from palpate.devices import Device, device_named
+from palpate.devices.trace_file import read_trace
 from palpate.errors import PalpateError, UsageError
 from palpate.network.kinds import import_when_needed
-from palpate.runtime.devices import Device, device_named
 from palpate.runtime.loop import Loop
 from palpate.runtime.realtime import obtain
 from palpate.runtime.recording import Ring, TickRecorder
@@ -28,12 +29,11 @@ from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.swap_desk import SwapDesk
 from palpate.runtime.touchable import load_touchable
-from palpate.runtime.trace_file import read_trace
 
 __all__ = ["FOREIGN", "main"]
 
 FOREIGN = ("scipy", "ngsolve", "matplotlib", "xarray", "dask", "distributed", "sklearn", "typer", "rich",
-           "pydantic", "pint", "zarr", "starlette")  # fmt: skip
+           "pydantic", "pint", "zarr", "starlette", "palpate.devices.doubles")  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

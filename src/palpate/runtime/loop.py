@@ -28,18 +28,20 @@ from functools import partial
 
 import numpy as np
 
+from palpate.devices import Device
+from palpate.devices.device import HARDWARE_PATIENCE
+from palpate.devices.tick_record import MAX_INPUTS
 from palpate.errors import DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.blending import Blend
 from palpate.runtime.coupling import STEPS, Coupling
-from palpate.runtime.devices import Device
 from palpate.runtime.hand_evaluator import HandEvaluator, Model
 from palpate.runtime.oscillation import OscillationWatch
 from palpate.runtime.passivity import PassivityController
 from palpate.runtime.publisher import Publisher
 from palpate.runtime.realtime import Metronome, Rest
 from palpate.runtime.recording import TickRecorder
-from palpate.runtime.safety import HARDWARE_PATIENCE, Fault, Limits, PlaceCheck, Safety, Stop, stalled
-from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES, Shared
+from palpate.runtime.safety import Fault, Limits, PlaceCheck, Safety, Stop, stalled
+from palpate.runtime.shared_state import MAX_PLACES, Shared
 from palpate.runtime.stability import FeltStiffness
 from palpate.runtime.swap import Swap
 from palpate.runtime.workspace import HandFrame, Workspace

@@ -65,10 +65,11 @@ import math
 import numpy as np
 from numba import njit
 
+from palpate.devices.tick_record import LEDGER
 from palpate.errors import UsageError
 from palpate.runtime.sensor_noise import NOISE_STATE, forget_motion, measure_noise
 
-__all__ = ["LEDGER", "LONGEST_DELAY", "PassivityController", "largest_damping"]
+__all__ = ["LONGEST_DELAY", "PassivityController", "largest_damping"]
 
 LONGEST_DELAY = 62  # ticks that a force may be late; longer delays are counted as this
 _RING = LONGEST_DELAY + 2
@@ -85,7 +86,6 @@ _LONGEST_FILTER = 0.030  # s, the largest τ: work of motions faster than 1/τ i
 
 # places in the state: outputs first, then what the next step needs
 _ENERGY, _LOWEST, _DAMPING, _INJECTED, _LEAK, _NOISE = range(6)
-LEDGER = 6
 _SEEN, _HEAD, _BALANCE, _STORED, _TICKS, _ALPHA = range(LEDGER, 12)
 # of three numbers each: filtered place, its way in the last tick, booked place, filtered force and its sum since
 _PLACE, _WAY, _BOOKED, _FORCE, _SUM = range(12, 27, 3)

@@ -21,11 +21,11 @@ from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from palpate import errors
+from palpate.devices import device_traits
 from palpate.errors import DeviceError, UsageError
 from palpate.network import shared_memory
 from palpate.network.kinds import outside_modules
 from palpate.processes import helper_environment
-from palpate.runtime.devices import device_traits
 from palpate.runtime.handover import hand_over, prepared
 from palpate.runtime.loop_report import LoopReport
 from palpate.runtime.recorder import TraceRecorder, model_facts
@@ -51,7 +51,7 @@ class LoopProcess:
     model : path
         File of a learnt body that can be touched.
     device : str
-        ``page``, or ``stroke:amplitude=0.02``; see `palpate.runtime.devices`.
+        ``page``, or ``stroke:amplitude=0.02``; see `palpate.devices`.
     rate : float
         Ticks per second, Hz.
     workspace : float, optional

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
+from palpate.devices.trace_file import TraceWriter
 from palpate.errors import DeviceError, PalpateError
 from palpate.runtime.recording import Ring
-from palpate.runtime.trace_file import TraceWriter
 
 __all__ = ["TraceRecorder", "machine_facts", "model_facts"]
 
@@ -167,7 +167,7 @@ def machine_facts() -> dict[str, Any]:
     """Return what the last bits of a computed force depend on besides the model: versions, and the processor."""
     import numba
 
-    from palpate import __version__
+    from palpate.version import __version__
 
     return {
         "palpate": __version__,

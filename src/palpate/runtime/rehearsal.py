@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from palpate.runtime.devices.page import PageDevice
+from palpate.devices.page import PageDevice
 from palpate.runtime.hand_evaluator import HandEvaluator, Model
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Limits

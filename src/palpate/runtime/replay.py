@@ -19,17 +19,18 @@ from typing import Any
 
 import numpy as np
 
+from palpate.devices.device import Sample, Traits
+from palpate.devices.tick_record import FLAGS
+from palpate.devices.trace_file import Trace, TraceWriter
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, FileFormatError, UsageError
-from palpate.runtime.devices.device import Sample, Traits
 from palpate.runtime.loop import Loop
 from palpate.runtime.recorder import machine_facts, model_facts
-from palpate.runtime.recording import FLAGS, Ring, TickRecorder
+from palpate.runtime.recording import Ring, TickRecorder
 from palpate.runtime.safety import Fault, Limits
 from palpate.runtime.shared_state import Shared, now
 from palpate.runtime.snapshot import restore
 from palpate.runtime.swap import Swap, swap_between
 from palpate.runtime.touchable import Touchable, load_touchable
-from palpate.runtime.trace_file import Trace, TraceWriter
 from palpate.runtime.workspace import Workspace
 
 __all__ = ["Replay", "ReplayDevice", "Replayed", "is_recorded_model", "loop_facts", "play"]

@@ -27,7 +27,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["HARDWARE_PATIENCE", "Fault", "Limits", "PlaceCheck", "Safety", "Stop", "stalled"]
+__all__ = ["Fault", "Limits", "PlaceCheck", "Safety", "Stop", "stalled"]
 
 
 class Fault(IntEnum):
@@ -75,7 +75,6 @@ _MEANINGS = {
 }
 
 
-HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised device gets zero force
 _SHORTEST_RAMP = 0.050  # s
 _WARMING = 10.0  # s over which motors average the force; windings take longer, which is on the safe side
 _WARM = 0.8  # share of the continuous force's square from which on the limit comes down

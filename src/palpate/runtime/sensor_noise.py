@@ -18,7 +18,7 @@ import math
 import numpy as np
 from numba import njit
 
-__all__ = ["NOISE_STATE", "forget_motion", "measure_noise", "quantisation_noise"]
+__all__ = ["NOISE_STATE", "forget_motion", "measure_noise"]
 
 _VARIANCE, _MEAN, _COUNT, _DIFFERENCES = 0, 1, 2, 3
 _ORDER = 6
@@ -30,11 +30,6 @@ _OUTLIER = 9.0  # of the mean square: more counts as this
 _FLOOR = 1e-6  # m: levels below are as good as none, and from here on a level can grow
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
-
-
-def quantisation_noise(resolution: float) -> float:
-    """Return the standard deviation, m, of the rounding to steps of `resolution`, m."""
-    return resolution / math.sqrt(12.0)
 
 
 @_jit

@@ -19,18 +19,17 @@ from typing import Any, Self
 
 import numpy as np
 
+from palpate.devices.tick_record import LEDGER, MAX_INPUTS
 from palpate.errors import DeviceError, UsageError
 from palpate.network import shared_memory
 from palpate.network.shared_memory import Block
 from palpate.runtime.loop_report import BINS, percentile
-from palpate.runtime.passivity import LEDGER
 from palpate.runtime.safety import Fault
 from palpate.runtime.stability import FeltStiffness
 
 __all__ = [
     "COMMAND",
     "INDENTATION",
-    "MAX_INPUTS",
     "MAX_PLACES",
     "STATE",
     "Block",
@@ -40,7 +39,6 @@ __all__ = [
     "size_of",
 ]
 
-MAX_INPUTS = 8
 MAX_PLACES = 4096
 FAULT_KINDS = 16
 ONSETS = 32  # of faults, whose times are kept

@@ -36,7 +36,7 @@ from palpate.errors import UsageError
 from palpate.runtime.coupling import coupling_stiffness
 
 if TYPE_CHECKING:
-    from palpate.runtime.devices.device import Traits
+    from palpate.devices.device import Traits
 
 __all__ = ["FeltStiffness", "passive_stiffness", "stable_stiffness"]
 

@@ -22,11 +22,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.devices.tick_record import MAX_INPUTS
 from palpate.errors import UsageError
 from palpate.runtime.blending import Blend
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.realtime import SLOW
-from palpate.runtime.shared_state import MAX_INPUTS, MAX_PLACES
+from palpate.runtime.shared_state import MAX_PLACES
 
 if TYPE_CHECKING:
     from palpate.runtime.loop import Loop

@@ -27,16 +27,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate.devices import device_named, device_traits
+from palpate.devices.device import HARDWARE_PATIENCE
 from palpate.errors import DeviceError
 from palpate.processes import helper_environment
-from palpate.runtime.devices import device_named, device_traits
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.loop import Loop
 from palpate.runtime.loop_report import LoopReport
 from palpate.runtime.machine import Check
 from palpate.runtime.realtime import Metronome, obtain
 from palpate.runtime.rehearsal import Rehearsal
-from palpate.runtime.safety import HARDWARE_PATIENCE, Limits
+from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared, now
 from palpate.runtime.workspace import Workspace
 from palpate.units import Range

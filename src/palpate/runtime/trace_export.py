@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from palpate.devices.tick_record import FLAGS
+from palpate.devices.trace_file import Trace
 from palpate.errors import UsageError
 from palpate.files import writing
 from palpate.output_files import require_outputs
-from palpate.runtime.recording import FLAGS
-from palpate.runtime.trace_file import Trace
 
 __all__ = ["FORMATS", "UNITS", "export_trace", "trace_table"]
 

@@ -16,12 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.devices.device import PLAIN_AXES, Axes
 from palpate.errors import UsageError
 
-__all__ = ["PLAIN_AXES", "Axes", "HandFrame", "Workspace"]
+__all__ = ["HandFrame", "Workspace"]
 
-Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
-PLAIN_AXES: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _ROUNDING = 1e-9  # largest error of R Rᵀ = 1 in a rotation
 
 _USED = 0.8  # share of the radius that the trained reach takes: the rest shows that the range has an end

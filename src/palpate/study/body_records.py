@@ -24,12 +24,7 @@ from palpate.physics import (
     Section,
 )
 from palpate.records import Count, Metres, Number, Pair, QuarticMetres, Record, SquareMetres
-from palpate.study.material_records import (
-    BeamMaterial,
-    SolidMaterial,
-    SolidMaterialRecord,
-    build_material,
-)
+from palpate.study.material_records import BeamMaterial, SolidMaterial, SolidMaterialRecord, build_material
 from palpate.study.part_records import PartRecord
 
 __all__ = [

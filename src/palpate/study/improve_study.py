@@ -92,13 +92,7 @@ def improve_study(
 
 
 def conclude(study: Study, paths: Paths, step: ImprovementStep) -> Outcome:
-    """Judge the surrogate of the last step by all of the study's targets, and write that into its file.
-
-    Raises
-    ------
-    UsageError
-        If the step has no surrogate yet.
-    """
+    """Judge the surrogate of the last step by all of the study's targets, and write that into its file."""
     if step.surrogate is None or step.train is None or step.test is None:
         raise UsageError("This step has no solves yet.", fix="Conclude with the last step.")
     train, test = split_rows(study, step.train, step.test)

@@ -54,7 +54,7 @@ _NEEDED = {
     "user": {"module", "function"},
 }
 _ALSO = {"user": {"constants", "bulk"}} | {law: {"bulk"} for law in ("mooney-rivlin", "yeoh", "ogden")}
-_POISSON = 0.45  # where neither Poisson's ratio nor a bulk modulus is given
+_POISSON = 0.45  # Poisson's ratio where neither it nor a bulk modulus is given
 _CONSTANTS = set().union(*_NEEDED.values(), *_ALSO.values())
 _LARGE = {
     "mooney-rivlin": MooneyRivlin,

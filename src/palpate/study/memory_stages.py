@@ -16,8 +16,8 @@ from palpate.study.study import Study
 
 __all__ = ["learn_histories", "sweep_histories"]
 
-TEST_SEED = 1000  # between the seeds of the histories to learn from and of those for testing
-BEYOND = 1.05  # how far the elastic body goes over the learnt histories, for those that go farther
+TEST_SEED = 1000  # distance of the seeds for testing from those of the histories to learn from
+BEYOND = 1.05  # reach of the elastic body over that of the learnt histories, for those that go farther
 
 
 def sweep_histories(study: Study, problem: Any) -> tuple[LoadHistories, LoadHistories]:

@@ -35,13 +35,7 @@ LAWS = ("neo-hookean", "st-venant-kirchhoff", "linear-elastic")
 
 
 def shown_part(study: Study) -> ShownPart:
-    """Return the part of a study as the page shows it, with the study's choices as those made at first.
-
-    Parameters
-    ----------
-    study : Study
-        A study of a part under a ball, as `part_study` makes it.
-    """
+    """Return the part of a study that `part_study` made as the page shows it, with its choices as the first ones."""
     from palpate.viewer.shown_part import PartChoices, ShownPart
 
     body, acting = _parts(study)

@@ -192,13 +192,7 @@ class PartRecord(Record):
         return (self.fixed,) if isinstance(self.fixed, str) else self.fixed
 
     def shape(self) -> ImportedSolid | ImportedMesh:
-        """Return the shape, with names for parts of its surface.
-
-        Raises
-        ------
-        PalpateError
-            If the file is missing or no body, or a surface's bounds hold nothing.
-        """
+        """Return the shape, with names for parts of its surface."""
         patches = self.patches()
         return part_shape(self.file, self.unit, self.element, self.feature_angle, patches)
 
@@ -232,23 +226,9 @@ def part_shape(
 ) -> ImportedSolid | ImportedMesh:
     """Return the shape of a part's file: a solid of CAD or a surface, else a volume mesh.
 
-    Parameters
-    ----------
-    file : str
-        Path of the file; its ending tells the format.
-    unit : str, optional
-        Unit of its numbers; STEP and IGES files state their own, a mesh is in m by default.
-    element : float, optional
-        Largest element in m, of a solid or a surface.
-    feature_angle : float, optional
-        Angle in degrees from which on an edge of a surface is sharp.
-    patches : tuple of SurfacePatch
-        Names for parts of the surface.
-
-    Raises
-    ------
-    UsageError, FileFormatError
-        If the file is missing, empty or of another format, or its unit is.
+    STEP and IGES files state the unit of their numbers, a mesh is in m by default. `element` is the largest element in
+    m, of a solid or a surface; `feature_angle` is in degrees, from which on an edge of a surface is sharp. The patches
+    are names for parts of the surface.
     """
     if part_kind(file) not in ("cad", "surface"):
         return ImportedMesh(file, unit or "m", patches)

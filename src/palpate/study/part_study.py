@@ -27,20 +27,19 @@ __all__ = ["part_study", "part_text", "study_file"]
 HELD, TOUCHED = "held", "touched"
 YOUNG, POISSON = 10e3, 0.45  # Pa; of soft tissue, until the user says what it is
 SMALL = 5e-3  # m: a part that would be smaller in mm may have been drawn in m
-FLAT, LEVEL = (
-    0.999,
-    0.02,
-)  # length of a plane's mean normal, and share of the height within which it is lowest
+# length of a plane's mean normal, and share of the height within which it is lowest
+FLAT, LEVEL = 0.999, 0.02
 FOOT = 0.05  # share of the box's footprint that a face has at least to stand on
 HOLD = 0.12  # share of the height that is held where no flat face is below
 RADIUS, DEPTH = 0.18, 0.5  # radius of the probe over the least extent, and its depth over the radius
-LARGEST = 0.3  # radius over the least extent, that a large surface may ask for
+LARGEST = 0.3  # radius over the least extent, for a large surface, at most
 CELLS = 300  # squares of an element's length on the footprint: about 15,000 unknowns, seconds a solve
 COARSE = 0.5  # element over the radius: coarser ones do not feel the ball
-LEAST_DEPTH = 1 / 25  # of the depth
-MARGIN = 3.0  # radii within the box of the touched surface, that places keep by themselves
+LEAST_DEPTH = 1 / 25  # least depth over the largest
+MARGIN = 3.0  # distance of places from the rim of the touched surface's box, in radii
+# leading numbers to which a proposal is rounded
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-LISTED = 20  # faces in the comments
+LISTED = 20  # faces that the comments name, at most
 
 
 def part_study(
@@ -189,9 +188,8 @@ def _with_touched(content: dict[str, Any], held: list[Any]) -> Study:
     """Return the study whose touched surface faces up, or is all that is not held where nothing does."""
     failure: UsageError | None = None
     fixed = content["body"]["fixed"]
-    kept = held or [
-        {"name": HELD, "faces": fixed}
-    ]  # else all that is left would take the faces of the file, too
+    # without a held face, all that is left would take the faces of the file, too
+    kept = held or [{"name": HELD, "faces": fixed}]
     ways: tuple[tuple[dict[str, Any], list[Any], Any], ...] = (
         ({"name": TOUCHED, "facing": "up"}, held, fixed),
         ({"name": TOUCHED}, kept, fixed if held else HELD),

@@ -45,8 +45,8 @@ __all__ = ["main", "rough_study", "work_on"]
 
 Say = Callable[[dict[str, Any]], None]
 
-_NICE = 5  # below the page and everything else that somebody waits for
-_GRACE = 5.0  # s to end in good order
+_NICE = 5  # niceness: below the page and everything else that somebody waits for
+_GRACE = 5.0  # s in which the work ends in good order
 
 
 def rough_study(study: Study) -> Study | None:
@@ -209,9 +209,8 @@ def main() -> int:
     """Carry out what the standard input asks for; the exit code is that of the error, 0 without one."""
     with contextlib.suppress(OSError, AttributeError):
         os.nice(_NICE)
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # Ctrl-C reaches the whole terminal: the page's process decides
+    # Ctrl-C reaches the whole terminal: the page's process decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, end_by_sigterm)
     say, stopping = _speaker(), threading.Event()
     asked = _wishes(stopping)

@@ -29,22 +29,19 @@ from palpate.surrogates.memories import Relaxation
 
 __all__ = ["held_press", "prony_times", "with_relaxation"]
 
-DEPTHS = (0.3, 0.9)  # of the study's largest: held presses that are learnt from
-UNSEEN = 0.6  # of the same: the press that judges
+DEPTHS = (0.3, 0.9)  # depths of the held presses that are learnt from, over the study's largest
+UNSEEN = 0.6  # depth of the press that judges, over the study's largest
 EARLY, LATE = 1 / 10, 4.0  # first look over the shortest time, last over the longest
-LOOKS = 14
-SPACING = 0.25  # of the ball's radius: places that remember
-MORE = 1.05  # of the material's share: a ball can't feel more relaxation than the material has
-MOST = 3  # terms that held presses tell apart
+LOOKS = 14  # times at which a held press is looked at
+SPACING = 0.25  # distance of the places that remember, over the ball's radius
+MORE = 1.05  # factor of the material's share: a ball can't feel more relaxation than the material has
+MOST = 3  # terms that held presses tell apart, at most
 
 
 def prony_times(study: Any) -> tuple[float, ...]:
     """Return the relaxation times in s, ascending, of a study's solid materials; none where nothing relaxes.
 
-    Parameters
-    ----------
-    study : Study
-        Any study; only bodies that a ball presses have such a memory.
+    Only bodies that a ball presses have such a memory.
     """
     if study.interaction.kind != "probe":
         return ()
@@ -72,9 +69,8 @@ def with_relaxation(
     learnt, unseen = records[: len(DEPTHS)], records[-1]
     most = min(MOST, len(times))
     found = identify_behind_pad(learnt, most=most)
-    if sum(found.relaxation.shares) > MORE * _largest_share(
-        study
-    ):  # the pad's part is not told by these presses
+    if sum(found.relaxation.shares) > MORE * _largest_share(study):
+        # these presses do not tell the part of the pad
         found = identify(learnt[-1], most=most)
     error = _error_on(unseen, found.relaxation)
     log(f"{found}; missed by {share(error)} at a depth that it was not fitted to")

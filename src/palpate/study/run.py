@@ -60,37 +60,18 @@ Rows: TypeAlias = Dataset | LoadHistories
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result of a study that was carried out.
-
-    Attributes
-    ----------
-    study : Study
-        The study that was carried out.
-    model : Surrogate
-        Result of learning, with its errors on unseen solves written into it.
-    train, test : Dataset or load histories
-        Solves that were learnt from, and solves that were not.
-    validation : Validation
-        Figures of the surrogate on the unseen solves.
-    history : optional
-        Record of learning.
-    rivals : mapping of name to History
-        The founding form of the filter beside ours, for studies with one input.
-    timings : mapping of stage to seconds
-        Duration of each stage.
-    comparisons : sequence of TouchComparison
-        Recorded touches beside the full model.
-    """
+    """Result of a study that was carried out."""
 
     study: Study
-    model: Any
-    train: Rows
-    test: Rows
-    validation: Validation
-    history: Any = None
+    model: Any  # with its errors on unseen solves written into it
+    train: Rows  # solves that were learnt from
+    test: Rows  # solves that were not
+    validation: Validation  # figures of the surrogate on the unseen solves
+    history: Any = None  # record of learning
+    # the founding form of the filter beside ours, by name, for studies with one input
     rivals: Mapping[str, Any] = field(default_factory=dict)
-    timings: Mapping[str, float] = field(default_factory=dict)
-    comparisons: Sequence[TouchComparison] = ()
+    timings: Mapping[str, float] = field(default_factory=dict)  # duration of each stage in s
+    comparisons: Sequence[TouchComparison] = ()  # recorded touches beside the full model
 
     def chapter(self) -> Chapter:
         """Return the outcome as a chapter of a report."""
@@ -132,9 +113,8 @@ def sweep_study(
         return train, test
     with contextlib.ExitStack() as stack:
         if cluster is None:
-            own = OnDemandCluster(
-                study.sweep.workers
-            )  # both sweeps: to start workers takes seconds, and to open a body
+            # one for both sweeps: to start workers takes seconds, and so does to open a body
+            own = OnDemandCluster(study.sweep.workers)
             cluster = study.sweep.scheduler or stack.enter_context(own)
         common: dict[str, Any] = {"cluster": cluster, "progress": progress, "case_limit": case_limit}
         log(f"{count(study.sweep.samples, 'solve')} to learn from{_solved_part(study, problem)}")
@@ -166,10 +146,7 @@ def _solved_part(study: Study, problem: Any) -> str:
 def load_data(study: Study, paths: Paths) -> tuple[Rows, Rows]:
     """Read the training and the unseen rows of a study from its files.
 
-    Raises
-    ------
-    UsageError
-        If the files are of another body or of other loads: the study was changed since they were solved.
+    Files of another body or of other loads are refused: the study was changed since they were solved.
     """
     if study.sweep is None or study.test is None:
         return LoadHistories.load(paths.histories), LoadHistories.load(paths.unseen_histories)
@@ -190,13 +167,7 @@ def load_data(study: Study, paths: Paths) -> tuple[Rows, Rows]:
 
 
 def split_rows(study: Study, data: Rows, further: Rows | None) -> tuple[Rows, Rows]:
-    """Split what was solved into training rows and rows that the network never sees.
-
-    Raises
-    ------
-    UsageError
-        If nothing is kept for testing.
-    """
+    """Split what was solved into training rows and rows that the network never sees."""
     if not isinstance(data, Dataset) or study.test is None:
         assert further is not None  # histories for testing are always made
         return data, further
@@ -310,10 +281,7 @@ def load_model(paths: Paths, train: Rows) -> tuple[Any, Any]:
     It was learnt from just these rows, or from the first of them where all of them gave no better one: then the
     ``no_better`` of its dataset is the hash of all.
 
-    Raises
-    ------
-    UsageError
-        If it was learnt from other rows than these: rows that it has seen might be taken for unseen ones.
+    What was learnt from other rows is refused: rows that it has seen might be taken for unseen ones.
     """
     model = Surrogate.load(paths.model)
     origin = model.meta.get("dataset", {})

@@ -17,13 +17,7 @@ _DOUBLE = np.dtype(np.float64)
 
 
 def place_at(position: Any, parameters: Any, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return a place (3,) and further inputs of this shape; float64 arrays are taken as they are, others are converted.
-
-    Raises
-    ------
-    UsageError
-        If there are not three coordinates and that many parameters.
-    """
+    """Return a place (3,) and further inputs of this shape; all but float64 arrays are converted."""
     if type(position) is not np.ndarray or position.dtype is not _DOUBLE:
         position = np.asarray(position, np.float64)
     if type(parameters) is not np.ndarray or parameters.dtype is not _DOUBLE:
@@ -37,13 +31,7 @@ def place_at(position: Any, parameters: Any, shape: tuple[int, ...]) -> tuple[np
 
 
 def rows_of(X: Any, inputs: Sequence[Range], words: str) -> np.ndarray:
-    """Return inputs (N, n) in double precision; `words` calls what they are given to by its name.
-
-    Raises
-    ------
-    UsageError
-        If they are of another shape, no numbers, or not finite.
-    """
+    """Return inputs (N, n), all finite, in double precision; `words` calls what they are given to by its name."""
     why = f"They are {', '.join(f'{r.name} ({r.unit})' if r.unit else r.name for r in inputs)}."
     try:
         X = np.ascontiguousarray(X, dtype=np.float64)

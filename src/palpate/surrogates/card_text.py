@@ -13,7 +13,7 @@ from palpate.format import share
 
 __all__ = ["bullets", "escape_markdown", "rows"]
 
-_RELATIVE = ("error", "RMSE", "percentile", "median", "p95", "share")  # figures that are shares
+_RELATIVE = ("error", "RMSE", "percentile", "median", "p95", "share")  # names of figures that are shares
 _METRES = (
     "radius",
     "depth",
@@ -39,22 +39,15 @@ _UNITS: dict[str, str] = {
     "lower": "m",
     "upper": "m",
 }
-_INTERVALS = ("depth",)  # two numbers are the ends of a range
-_HEADS = ("type", "law", "name")  # what a part is, in the line of its name
-_MOST = 12  # values of a list that are shown
+_INTERVALS = ("depth",)  # names whose two numbers are the ends of a range
+_HEADS = ("type", "law", "name")  # keys that say what a part is, shown in the line of its name
+_MOST = 12  # values of a list that are shown, at most
 
 
 def bullets(part: Mapping[str, Any], escape: Callable[[str], str] = str, depth: int = 0) -> list[str]:
-    """Return a nested record as nested Markdown bullets; what is empty is left out.
+    """Return a record of names and JSON values as nested Markdown bullets; what is empty is left out.
 
-    Parameters
-    ----------
-    part : mapping
-        Names and values as JSON knows them.
-    escape : callable
-        Applied to each text of the record.
-    depth : int
-        How far the bullets are indented.
+    `escape` is applied to each text of the record.
     """
     lines: list[str] = []
     for name, value in part.items():

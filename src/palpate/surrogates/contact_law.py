@@ -48,21 +48,9 @@ def choices() -> tuple[str, ...]:
 
 
 def crossing_length(plane_modulus: float, pad: float, radius: float) -> float:
-    """Depth a (m) at which pad and half-space are equally soft: (8 E*/(5πk))²/R.
+    """Return the depth a (m) at which pad and half-space are equally soft: (8 E*/(5πk))²/R.
 
-    Parameters
-    ----------
-    plane_modulus : float
-        E* = E/(1 − ν²), Pa.
-    pad : float
-        k, N/m³.
-    radius : float
-        R, m.
-
-    Raises
-    ------
-    UsageError
-        If one of them is not positive and finite.
+    The plane modulus E* = E/(1 − ν²) is in Pa, the pad's k in N/m³, the radius R in m; all are positive.
     """
     if not all(math.isfinite(v) and v > 0 for v in (plane_modulus, pad, radius)):
         raise UsageError(

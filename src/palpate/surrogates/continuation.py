@@ -41,7 +41,7 @@ from palpate.units import Range
 __all__ = ["Continuation", "saturated"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
-_SHARE = 0.25  # of a range or of the deepest depth: how far ℓ is followed beyond it
+_SHARE = 0.25  # part of a range or of the deepest depth, to which ℓ is followed beyond it
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,7 +41,7 @@ from palpate.units import Range, bounds
 
 __all__ = ["LearntEnergy"]
 
-_SAMPLES = 4096  # of the trained ranges, for what is largest there
+_SAMPLES = 4096  # places drawn in the trained ranges, to find what is largest there
 _PART = 2000  # answers that are worth a thread: about 10 ms
 
 

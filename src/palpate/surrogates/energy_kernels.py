@@ -67,16 +67,15 @@ __all__ = [
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
-ANSWER, FORCE, STIFFNESS = 19, slice(2, 5), slice(5, 14)
+ANSWER, FORCE, STIFFNESS = 19, slice(2, 5), slice(5, 14)  # numbers of an answer, and places in it
 PLAIN, AMPLITUDE, SLOPE = 14, 15, slice(16, 19)
 _REGION, _DEEPEST, _DEPTH_WIDTH = range(3)  # places in `numbers`
-_SLACK = 1e-9  # of a range: round-off at its edge is still inside
+_SLACK = 1e-9  # share of a range: a place that round-off puts so far beyond its edge is still inside
 # places in `small`: ∇²U₀, ∇²ℓ, and two matrices and ∇²d for a baseline; then vectors as rows
 HESSIAN, LOG, BEND, OTHER, SURFACE, VECTORS, MORE, ROOT = range(8)
-SMALL = 8
-GRADIENT, _SLOPE, OUTWARD = range(
-    3
-)  # rows of small[VECTORS]: ∇U₀, ∇ℓ, and the outer normal of a touched surface
+SMALL = 8  # matrices in `small`
+# rows of small[VECTORS]: ∇U₀, ∇ℓ, and the outer normal of a touched surface
+GRADIENT, _SLOPE, OUTWARD = range(3)
 _LAST = 2  # row of small[MORE]: the trained point last near; the others are a baseline's scratch
 # first row of small[ROOT]: ∇s₀, s₀ the signed root of 2 U₀
 

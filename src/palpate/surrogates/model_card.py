@@ -22,47 +22,24 @@ from palpate.units import Range
 
 __all__ = ["FORMAT_VERSION", "NOT_STATED", "ModelCard", "card_of"]
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 1  # version of the card's own layout
 NOT_STATED = "not stated"
 
 
 @dataclass(frozen=True)
 class ModelCard:
-    """The card of a learnt body or network.
+    """The card of a learnt body or network."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the body.
-    kind : str
-        What it is, in words.
-    author, licence : str
-        Who made it, and under which licence (an SPDX identifier, such as ``CC-BY-4.0``); "not stated" where the file
-        does not say.
-    answers : mapping
-        Inputs with trained ranges and units, and what is answered.
-    trained_on : mapping
-        Body, solves, design, seed, versions, date, and the hashes of dataset and configuration.
-    errors : mapping
-        Figures on solves that were not learnt from, and by leaving out.
-    limits : tuple of str
-        Sentences on where the answers hold and what happens beyond.
-    warnings : tuple of str
-        What was suspicious in the making.
-    hashes : mapping of name to str
-        SHA-256 of the file, of the dataset and of the configuration, where they are known.
-    """
-
-    name: str
-    kind: str
-    author: str
-    licence: str
-    answers: Mapping[str, Any]
-    trained_on: Mapping[str, Any]
-    errors: Mapping[str, Any]
-    limits: tuple[str, ...]
-    warnings: tuple[str, ...]
-    hashes: Mapping[str, str]
+    name: str  # name of the body
+    kind: str  # what it is, in words
+    author: str  # who made it; "not stated" where the file does not say
+    licence: str  # SPDX identifier, such as CC-BY-4.0; "not stated" where the file does not say
+    answers: Mapping[str, Any]  # inputs with trained ranges and units, and what is answered
+    trained_on: Mapping[str, Any]  # body, solves, design, seed, versions, date, hashes of data
+    errors: Mapping[str, Any]  # figures on solves that were not learnt from, and by leaving out
+    limits: tuple[str, ...]  # sentences on where the answers hold and what happens beyond
+    warnings: tuple[str, ...]  # what was suspicious in the making
+    hashes: Mapping[str, str]  # SHA-256 of file, dataset and configuration, where they are known
 
     def with_hash(self, name: str, sha256: str) -> ModelCard:
         """Return the card with a further hash, such as that of the weights that an export writes."""
@@ -125,19 +102,9 @@ class ModelCard:
 
 
 def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard:
-    """Return the card of a learnt body, a network, or what `palpate.fit` made.
+    """Return the card of a learnt body, a network, or what `palpate.fit` made; other values are refused.
 
-    Parameters
-    ----------
-    model : Surrogate, Network or Fitted
-        The learnt value.
-    file : path, optional
-        Its file, whose SHA-256 goes into the card.
-
-    Raises
-    ------
-    UsageError
-        If the value is of another kind, such as load histories.
+    The SHA-256 of its file, if that is given, goes into the card.
     """
     network = getattr(model, "network", model)
     if not (hasattr(model, "energy") or hasattr(network, "outputs")):

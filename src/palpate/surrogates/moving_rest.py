@@ -24,21 +24,10 @@ _NEWTON, _AT_REST = 12, 1e-12  # steps to a moved rest, and the share of its amp
 
 
 class MovingRest:
-    """Place along one direction at which nothing pulls; nothing is allocated.
+    """The place `lies` (3,) in m along one direction at which nothing pulls; nothing is allocated.
 
-    Attributes
-    ----------
-    lies : (3,)
-        That place, m.
-
-    Parameters
-    ----------
-    elastic : SurrogateEvaluator
-        The answer of the body without its memory.
-    memory : MemoryState
-        With ``release(dt)``, which returns the amplitude of the body that nobody holds.
-    direction : (3,)
-        The one felt direction, a unit vector.
+    `elastic` is the evaluator of the body without its memory. The state `memory` has ``release(dt)``, which returns the
+    amplitude of the body that nobody holds. `direction` (3,) is the one felt direction, a unit vector.
     """
 
     def __init__(self, elastic: Any, memory: Any, direction: np.ndarray) -> None:

@@ -12,7 +12,6 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.format import count, millimetres, share
 from palpate.network import load_archive
 from palpate.network.codec import load_value, save_value
+from palpate.page_hook import page_of
 from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.fields import FieldSurrogate, NodeField
 from palpate.surrogates.memories import Memory, Patches
@@ -31,16 +31,10 @@ from palpate.units import Range, bounds
 
 __all__ = ["KIND", "Surrogate", "correction_count", "correction_warning"]
 
-_SAMPLES = 4096  # of the trained ranges, for a typical press
+_SAMPLES = 4096  # places in the trained ranges, among which a typical press is found
 KIND = "surrogate"  # what the file's header calls it
-_FORMER = (
-    "touch",
-    "held-body",
-    "touched-body",
-    "touch-surrogate",
-    "grasp-surrogate",
-    "field-surrogate",
-)  # of 0.1.0
+# kinds of files of version 0.1.0
+_FORMER = ("touch", "held-body", "touched-body", "touch-surrogate", "grasp-surrogate", "field-surrogate")
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,9 +129,7 @@ class Surrogate:
         UsageError
             If the body is drawn as a line, or a part of it has no C source.
         """
-        # by name: pages stand above bodies, and only whoever asks for one needs them
-        page = import_module("palpate.viewer.file_page")
-        return str(page.html_page(self))
+        return page_of(self)
 
     def _repr_html_(self) -> str | None:
         """Show the body in a notebook, in a frame of its own; None where it can't be a page."""

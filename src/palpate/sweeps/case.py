@@ -38,8 +38,8 @@ __all__ = [
 
 OPEN_LIMIT = 600.0
 """Time in s that opening a problem may take at least: it meshes, and imports what it needs."""
-_TRIES = 2  # that a case gets: the first may have ended for a reason of its own, such as want of memory
-_TRACE = 3000  # characters of a traceback that a row keeps, its end
+_TRIES = 2  # tries of a case: the first may have ended for a reason of its own, such as want of memory
+_TRACE = 3000  # characters that a row keeps of the end of a traceback
 
 Columns: TypeAlias = dict[str, np.ndarray]
 """An array for each answer of a dataset, samples first."""
@@ -67,43 +67,21 @@ def failed_rows(count: int, schema: Sequence[Field], message: str) -> Columns:
 
 @dataclass(frozen=True)
 class Task:
-    """The problem of a sweep, as workers get it.
+    """The problem of a sweep, as workers get it."""
 
-    Attributes
-    ----------
-    problem : bytes
-        The problem, pickled with its functions.
-    identity : str
-        A digest of these bytes: a child that has the same problem open goes on with its solver.
-    schema : tuple of Field
-        Fields to record, with the bookkeeping.
-    limit : float
-        Time in s that a case may take.
-    run : str
-        A name of this sweep's run, which no other run has.
-    """
-
-    problem: bytes
-    identity: str
-    schema: tuple[Field, ...]
-    limit: float
-    run: str
+    problem: bytes  # pickled with its functions
+    identity: str  # a digest of these bytes: a child that has the same problem open goes on with its solver
+    schema: tuple[Field, ...]  # fields to record, with the bookkeeping
+    limit: float  # time in s that a case may take
+    run: str  # a name of this sweep's run, which no other run has
 
 
 @dataclass(frozen=True)
 class Failure:
-    """An exception of the problem's own, as text.
+    """An exception of the problem's own, as text."""
 
-    Attributes
-    ----------
-    reason : str
-        Its kind and its words.
-    trace : str
-        Its traceback.
-    """
-
-    reason: str
-    trace: str
+    reason: str  # its kind and its words
+    trace: str  # its traceback
 
     def __str__(self) -> str:
         return f"{self.reason}\n\n{self.trace[-_TRACE:]}".rstrip()

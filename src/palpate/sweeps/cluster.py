@@ -27,7 +27,7 @@ from palpate.processes import available_cores, helper_environment
 
 __all__ = ["LocalCluster", "OnDemandCluster", "Scheduler", "local_cluster"]
 
-_GRACE = 1.0  # s to end by themselves; a worker in the midst of a solve does not
+_GRACE = 1.0  # s in which workers end by themselves; one in the midst of a solve does not
 _SPARE_LIVES = 16  # workers started again after a crash, per cluster
 
 
@@ -269,7 +269,13 @@ class Scheduler:
         )
 
     def security(self) -> Any:
-        """Return Dask's record of these files, with what its configuration adds; None for an address without TLS."""
+        """Return Dask's record of these files, with what its configuration adds; None for an address without TLS.
+
+        Raises
+        ------
+        UsageError
+            If the address asks for certificates that are neither given nor configured.
+        """
         import distributed
 
         if not self.address.startswith("tls://"):

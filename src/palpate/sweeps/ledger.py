@@ -22,18 +22,10 @@ __all__ = ["Ledger"]
 
 @dataclass(frozen=True)
 class Ledger:
-    """The parts of one sweep.
+    """The parts of one sweep."""
 
-    Attributes
-    ----------
-    path : Path
-        Path of the dataset when it is complete.
-    config : str
-        Hash of the sweep's configuration.
-    """
-
-    path: Path
-    config: str
+    path: Path  # of the dataset when it is complete
+    config: str  # hash of the sweep's configuration
 
     @property
     def parts(self) -> Path:
@@ -46,15 +38,7 @@ class Ledger:
         return _config_in(self.parts / "plan.json") == self.config
 
     def complete(self) -> Dataset | None:
-        """Read the finished dataset, if there is one.
-
-        Raises
-        ------
-        UsageError
-            If something else is at the path.
-        FileFormatError
-            If what is there can't be read.
-        """
+        """Read the finished dataset, if there is one."""
         restore_folder(self.path)
         if not self.path.exists():
             return None
@@ -70,13 +54,7 @@ class Ledger:
         return dataset
 
     def begin(self) -> None:
-        """Open the ledger.
-
-        Raises
-        ------
-        UsageError
-            If it belongs to another sweep.
-        """
+        """Open the ledger; one that belongs to another sweep is refused."""
         plan = self.parts / "plan.json"
         if (config := _config_in(plan)) is not None:
             self._check(self.parts, config)
@@ -100,17 +78,9 @@ class Ledger:
         part.save(self.parts / f"part-{part.hash[:16]}.zarr", overwrite=True)
 
     def finish(self, dataset: Dataset) -> Dataset:
-        """Write the whole dataset and drop the parts.
+        """Write the whole dataset, drop the parts, and return the dataset that is at the path now.
 
-        Returns
-        -------
-        Dataset
-            The dataset at the path now: where another run of the same sweep was faster, that run's.
-
-        Raises
-        ------
-        UsageError
-            If something else has appeared at the path meanwhile.
+        Where another run of the same sweep was faster, it is that run's.
         """
         other = self.complete()
         if other is None:

@@ -24,38 +24,18 @@ from palpate.sweeps.case import Columns
 from palpate.sweeps.problem import Checking, Designed, Problem, has_chains, missing_members, own_design
 from palpate.sweeps.space import Design, Space, design_points
 
-__all__ = [
-    "Plan",
-    "config_hash",
-    "make_plan",
-    "neighbour_chains",
-    "provenance",
-]
+__all__ = ["Plan", "config_hash", "make_plan", "neighbour_chains", "provenance"]
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Points to solve at, and the labels of the answers.
+    """Points to solve at, and the labels of the answers."""
 
-    Attributes
-    ----------
-    problem : Problem
-        The question that is asked at each point.
-    space : Space
-        Ranges of its inputs.
-    points : (N, n) array
-        Inputs of each sample.
-    design : str
-        Name of the design that placed the points.
-    seed : int
-        Seed of the design.
-    """
-
-    problem: Problem
-    space: Space
-    points: np.ndarray
-    design: str
-    seed: int
+    problem: Problem  # the question that is asked at each point
+    space: Space  # ranges of its inputs
+    points: np.ndarray  # (N, n) inputs of each sample
+    design: str  # name of the design that placed the points
+    seed: int  # of the design
 
     @functools.cached_property
     def config(self) -> str:
@@ -101,13 +81,7 @@ class Plan:
 def make_plan(
     body: Any, interactions: Any, samples: int | None, seed: int, design: str | Design | None, points: Any
 ) -> Plan:
-    """Make the plan of a sweep; the arguments are those of `sweep`.
-
-    Raises
-    ------
-    UsageError
-        For a wrong argument.
-    """
+    """Make the plan of a sweep; the arguments are those of `sweep`."""
     problem = _problem(body, interactions)
     space = Space(problem.ranges)
     if (samples is None) == (points is None):
@@ -173,23 +147,12 @@ _LONGEST, _SHORTEST = 32, 4  # samples of a chain
 
 
 def neighbour_chains(unit: np.ndarray, rest: np.ndarray) -> list[np.ndarray]:
-    """Arrange samples in chains of neighbours, each in an order that makes warm starts pay.
+    """Return samples as chains of neighbours, each a list of rows in an order that makes warm starts pay.
 
-    The points are halved across their widest side until a chain is short (a k-d tree); within a chain the
-    order goes from the point next to `rest` to its nearest neighbour and so on. The chains depend on the
-    points alone, not on the number of workers: the same sweep gives the same bits with any number of them.
-
-    Parameters
-    ----------
-    unit : (N, n) array
-        Points, scaled to [0, 1].
-    rest : (n,) array
-        The point without load, on the same scale.
-
-    Returns
-    -------
-    list of int arrays
-        Row indices of each chain.
+    The points are halved across their widest side until a chain is short (a k-d tree); within a chain the order goes
+    from the point next to `rest` to its nearest neighbour and so on. The chains depend on the points alone, not on the
+    number of workers: the same sweep gives the same bits with any number of them. The points (N, n) and the point
+    without load (n,) are scaled to [0, 1].
     """
     # some eight chains at least, to keep the workers busy to the end
     largest = int(np.clip(len(unit) // 8, _SHORTEST, _LONGEST))

@@ -35,7 +35,7 @@ __all__ = ["connect", "deferred_interrupt", "run"]
 
 _PATIENCE = 0.5  # s between looks at the workers
 _FETCH = 5.0  # s; Dask's client may wait for ever for a result whose worker died just after it
-_TRIES = 3  # that a chain gets on workers that vanish
+_TRIES = 3  # tries of a chain on workers that vanish
 _KEPT = "What is solved is kept where the sweep has a path: the same command goes on."
 
 
@@ -45,11 +45,6 @@ def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Cli
 
     A `LocalCluster` or an `OnDemandCluster`, a `Scheduler` or its address, or a cluster or client of Dask's is used and
     left running; for ``None`` a cluster is started and ended.
-
-    Raises
-    ------
-    ResourceError
-        If no scheduler answers.
     """
     import distributed
 
@@ -130,29 +125,8 @@ def run(
     A case that fails becomes a row with the reason, and the sweep goes on. A chain whose worker vanishes is given to
     another one; if that happens again and again, all its rows have failed.
 
-    Parameters
-    ----------
-    client : distributed.Client
-        Connection to the scheduler.
-    revive : callable
-        Starts dead workers again.
-    problem : Problem
-        The question that is asked at each point.
-    schema : sequence of Field
-        Fields to record, with the bookkeeping.
-    points : (N, n) array
-        Inputs of each sample.
-    chains : sequence of int arrays
-        Rows of `points`.
-    accept : callable
-        Takes rows and their answers.
-    case_limit : float
-        Time in s that a case may take.
-
-    Raises
-    ------
-    ResourceError
-        If the scheduler is lost.
+    The inputs `points` (N, n) are solved by `chains` of their rows, a case within `case_limit` seconds, and `accept`
+    takes rows and their answers. The schema has the bookkeeping too; `revive` starts dead workers again.
     """
     finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
     pending: dict[Any, _Chain] = {}

@@ -15,15 +15,7 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.units import Range, bounds
 
-__all__ = [
-    "DESIGNS",
-    "Design",
-    "Space",
-    "design_points",
-    "grid",
-    "random",
-    "sobol",
-]
+__all__ = ["DESIGNS", "Design", "Space", "design_points", "grid", "random", "sobol"]
 
 
 @dataclass(frozen=True)
@@ -222,13 +214,7 @@ DESIGNS: dict[str, Design] = {"grid": grid, "sobol": sobol, "random": random}
 
 
 def design_points(design: str | Design, space: Space, samples: int, seed: int) -> np.ndarray:
-    """Return the points (N, n) of a design, given itself or by name.
-
-    Raises
-    ------
-    UsageError
-        If there is no design of this name.
-    """
+    """Return the points (N, n) of a design, given itself or by name."""
     if not isinstance(design, str):
         return space.points(design(space, samples, seed))
     if design not in DESIGNS:

@@ -22,11 +22,7 @@ from palpate.sweeps.plan import Plan, make_plan
 from palpate.sweeps.runner import connect, run
 from palpate.sweeps.space import Design
 
-__all__ = [
-    "Report",
-    "reporter",
-    "sweep",
-]
+__all__ = ["Report", "reporter", "sweep"]
 
 _FLUSH_SECONDS = 3.0  # most work that a killed sweep loses; a store of many small files is slow to write
 

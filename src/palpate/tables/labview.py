@@ -51,10 +51,7 @@ def is_labview(text: str) -> bool:
 def labview_rows(text: str) -> tuple[list[Row], str, str, list[str]]:
     """Return rows with names and units of the channels on top, the separator, the decimal mark, and notes.
 
-    Raises
-    ------
-    UsageError
-        If the file ends within a header, or its segments have different channels; the message begins with the line.
+    Where the file ends within a header, or segments have different channels, the error's message begins with the line.
     """
     lines = text.split("\n")
     separator = "," if any(line.startswith("Separator,") for line in lines[:40]) else "\t"

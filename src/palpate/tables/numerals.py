@@ -59,14 +59,11 @@ def is_numeral(cell: str) -> bool:
 class Numerals:
     """Convention by which numbers are written.
 
-    Attributes
-    ----------
-    decimal : str
-        The decimal mark, "." or ",". The other one may stand between groups of three digits, as blanks and
-        apostrophes may.
+    The one of "." and "," that is not the decimal mark may stand between groups of three digits, as blanks and
+    apostrophes may.
     """
 
-    decimal: str = "."
+    decimal: str = "."  # the decimal mark, "." or ","
 
     @classmethod
     def of(cls, columns: Sequence[Sequence[Cell]], separator: str | None) -> Numerals:

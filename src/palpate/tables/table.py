@@ -28,15 +28,7 @@ from palpate.format import by_number
 from palpate.tables.labview import is_labview, labview_rows
 from palpate.tables.numerals import Numerals
 from palpate.tables.table_body import check_widths, readings_of, words_among_numbers
-from palpate.tables.table_layout import (
-    Head,
-    Row,
-    body_of,
-    choose_separator,
-    head_of,
-    rows_of,
-    split_comments,
-)
+from palpate.tables.table_layout import Head, Row, body_of, choose_separator, head_of, rows_of, split_comments
 from palpate.tables.table_text import read_table_text
 from palpate.tables.unit_names import name_and_unit, plain_unit, si_unit
 from palpate.unit_text import registry

@@ -31,21 +31,9 @@ _NUMERIC = frozenset("0123456789+-−.,")  # what a number begins with
 def readings_of(
     rows: Sequence[Row], head: Head | None, columns: Sequence[int]
 ) -> tuple[list[Row], list[str]]:
-    """Return the rows that are readings, and notes on what was left out.
+    """Return the rows below the head that are readings, and notes on what was left out.
 
-    Parameters
-    ----------
-    rows : sequence of Row
-        Rows below the head.
-    head : Head, optional
-        The head.
-    columns : sequence of int
-        Columns that hold numbers.
-
-    Raises
-    ------
-    UsageError
-        If the table begins anew with other names or units; the message begins with the line.
+    `columns` are those that hold numbers. A table that begins anew with other names or units is refused.
     """
     rows = [row for row in rows if row.filled]
     words = [i for i, row in enumerate(rows) if any(map(_is_word, row.cells))]

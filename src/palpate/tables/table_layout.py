@@ -53,27 +53,13 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Head:
-    """Content of a table's head.
+    """Content of a table's head."""
 
-    Attributes
-    ----------
-    names : Row
-        Names of the columns, as they stand there.
-    units : Row, optional
-        Row of units.
-    others : tuple of Row
-        Further rows of names, of the whole width, from the nearest on.
-    groups : tuple of Row
-        Rows with names of groups of columns.
-    skipped : tuple of int
-        Lines that are neither.
-    """
-
-    names: Row
-    units: Row | None = None
-    others: tuple[Row, ...] = ()
-    groups: tuple[Row, ...] = ()
-    skipped: tuple[int, ...] = ()
+    names: Row  # of the columns, as they stand there
+    units: Row | None = None  # row of units
+    others: tuple[Row, ...] = ()  # further rows of names, of the whole width, from the nearest on
+    groups: tuple[Row, ...] = ()  # rows with names of groups of columns
+    skipped: tuple[int, ...] = ()  # lines that are neither
 
 
 def split_comments(text: str) -> tuple[list[tuple[int, str]], list[tuple[int, str]], str | None]:
@@ -137,13 +123,7 @@ def _share_of_numbers(rows: Sequence[tuple[str, ...]], width: int) -> float:
 
 
 def rows_of(lines: Sequence[tuple[int, str]], separator: str | None) -> Iterator[Row]:
-    """Yield the rows of numbered lines; a quoted cell may have several lines.
-
-    Raises
-    ------
-    UsageError
-        If a quote is not closed.
-    """
+    """Yield the rows of numbered lines; a quoted cell may have several lines."""
     i = 0
     while i < len(lines):
         number, line = lines[i]
@@ -202,13 +182,7 @@ def _words(text: str) -> list[str]:
 
 
 def body_of(rows: Sequence[Row]) -> tuple[int, tuple[int, ...]]:
-    """Return the index of the first row of data, and the columns that hold numbers; rows without any have none.
-
-    Parameters
-    ----------
-    rows : sequence of Row
-        All rows of the table, with its head.
-    """
+    """Return the index of the first row of data, and the columns that hold numbers; rows without any have none."""
     patterns: collections.Counter[tuple[int, ...]] = collections.Counter()
     for row in rows[-_SAMPLE:]:
         patterns[tuple(j for j, cell in enumerate(row.cells) if is_numeral(cell))] += 1

@@ -20,10 +20,8 @@ __all__ = ["workbook_rows"]
 
 # rows of numbers deflate to a tenth, constant ones to a hundredth; blanks to a thousandth
 _LARGEST_BLANK, _DENSEST = 50_000_000, 200
-_EMPTY_CELLS, _EMPTY_SHARE = (
-    1_000_000,
-    100,
-)  # cells that rows may have in all, and more for each full one
+# cells that rows may have in all, and more for each full one
+_EMPTY_CELLS, _EMPTY_SHARE = 1_000_000, 100
 
 
 def workbook_rows(path: Path, sheet: str | None) -> tuple[list[Row], list[str]]:

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from palpate.devices.trace_file import Trace
 from palpate.errors import SolverError, UsageError
-from palpate.runtime.trace_file import Trace
 from palpate.validation.touch_comparison import TouchComparison
 
 __all__ = ["compare_full_model", "stroke_moments"]
 
 Progress = Callable[[int, int, float], None]
-_EVERY = 5.0  # s between two words on the progress
+_EVERY = 5.0  # s between two messages on the progress
 _SECANTS, _CLOSE = 12, 1e-8  # solves for a load at most, and share of the way to which it is found
 
 

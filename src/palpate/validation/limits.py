@@ -15,17 +15,7 @@ from typing import Literal
 
 from palpate.errors import UsageError
 
-__all__ = [
-    "CRITERIA",
-    "FAINT",
-    "FAINT_JND",
-    "FORCE_JND",
-    "Bound",
-    "Check",
-    "Criterion",
-    "Grade",
-    "Limits",
-]
+__all__ = ["CRITERIA", "FAINT", "FAINT_JND", "FORCE_JND", "Bound", "Check", "Criterion", "Grade", "Limits"]
 
 FORCE_JND = 0.07
 """Just noticeable relative difference of a force (Jones 1989; Pang, Tan & Durlach 1991)."""

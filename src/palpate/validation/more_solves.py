@@ -14,10 +14,10 @@ __all__ = ["advice_on_solves", "learning_curve"]
 FALLING = ("force_median", "force_p95", "light_force_p95", "stiffness_p95", "direction_p95")
 """Limits whose figures fall with the number of solves."""
 
-USUAL = 1.0  # exponent of the fall where only one number of solves is known: errors go as one over it
+USUAL = 1.0  # exponent of the fall where one number of solves alone is known: errors go as one over it
 SLOWEST, FASTEST = 0.5, 2.0  # exponents that two points of a curve may give: they scatter
-MOST = 20  # times as many solves: beyond it the curve says nothing
-MARGIN = 1.1  # of the number of solves, since errors scatter
+MOST = 20  # factor of the number of solves, beyond which the curve says nothing
+MARGIN = 1.1  # factor on the number of solves, since errors scatter
 
 Curve = Sequence[Mapping[str, Any]]
 """Points of a learning curve: ``{"solves": n, "force_p95": …}``."""

@@ -26,8 +26,8 @@ from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchS
 
 __all__ = ["Subject", "hand_inputs", "line_of"]
 
-SEEN = 1e-9  # in scaled inputs: a solve this near to one that was trained on is no test
-RADIUS = 1e-9  # relative: radii that are the same
+SEEN = 1e-9  # distance in scaled inputs, within which a solve was trained on and is no test
+RADIUS = 1e-9  # relative difference of radii that are the same
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,14 +19,14 @@ from typing import Any
 
 import numpy as np
 
+from palpate.devices.trace_file import Trace
 from palpate.errors import UsageError
 from palpate.format import plain, share
-from palpate.runtime.trace_file import Trace
 from palpate.validation.unseen_solves import ForceSamples, TouchSolves, force_jnd
 
 __all__ = ["TouchComparison", "compare_traces", "solves_beside"]
 
-_NEAR = 0.05  # of the inputs' half ranges: how near to a stroke a solve lies beside it
+_NEAR = 0.05  # distance in half ranges of the inputs, within which a solve lies beside a stroke
 _AT_LEAST = 20  # solves beside a stroke that are shown, though none may be so near
 
 

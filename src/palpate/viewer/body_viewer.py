@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Unpack
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -13,7 +13,13 @@ from starlette.routing import Route
 
 from palpate.viewer.compression import BinaryAnswers
 from palpate.viewer.shown_body import ShownBody, body_of
-from palpate.viewer.web_server import STATIC, LocalServer, local_application, wait_until_interrupted
+from palpate.viewer.web_server import (
+    LocalServer,
+    ServerOptions,
+    local_application,
+    skeleton,
+    wait_until_interrupted,
+)
 
 __all__ = ["BodyViewer", "body_application", "show"]
 
@@ -24,10 +30,7 @@ def body_application(body: ShownBody) -> Starlette:
     once, each = BinaryAnswers(keep=True), BinaryAnswers(keep=False)
     facts, mesh = body.shown(parts).to_json(), body.surface(parts).pack()
 
-    # the skeleton of all pages; a touched body's is the other one
-    html = (
-        (STATIC / "index.html").read_text(encoding="utf-8").replace('data-mode="touch"', 'data-mode="shown"')
-    )
+    html = skeleton("shown")
 
     async def page(_: Request) -> Response:
         return HTMLResponse(html)
@@ -87,17 +90,8 @@ class BodyViewer(LocalServer):
         If the file can't be read.
     """
 
-    def __init__(
-        self,
-        source: Any,
-        *,
-        name: str = "",
-        port: int = 8080,
-        host: str = "127.0.0.1",
-        strict_port: bool = False,
-        token: bool = True,
-    ) -> None:
-        super().__init__(port, host, strict_port=strict_port, token=token)
+    def __init__(self, source: Any, *, name: str = "", **server: Unpack[ServerOptions]) -> None:
+        super().__init__(**server)
         self.body = body_of(source, name)
 
     @property
@@ -113,12 +107,9 @@ def show(
     source: Any,
     *,
     name: str = "",
-    port: int = 8080,
-    host: str = "127.0.0.1",
-    strict_port: bool = False,
-    token: bool = True,
     open_browser: bool = False,
     on_ready: Callable[[BodyViewer], object] | None = None,
+    **server: Unpack[ServerOptions],
 ) -> BodyViewer:
     """Show solved bodies in the browser until interrupted (Ctrl-C) or terminated; in a notebook, go on at once.
 
@@ -139,6 +130,6 @@ def show(
     -----
     The other parameters and the errors are those of `BodyViewer`, which does the same without waiting.
     """
-    viewer = BodyViewer(source, name=name, port=port, host=host, strict_port=strict_port, token=token)
+    viewer = BodyViewer(source, name=name, **server)
     wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)
     return viewer

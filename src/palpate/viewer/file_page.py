@@ -20,16 +20,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate.errors import AccuracyError, UsageError
+from palpate.devices import device_traits
+from palpate.errors import UsageError
 from palpate.export.build_core import built_core
-from palpate.export.check_points import Comparison, compare_body, compare_field
+from palpate.export.check_points import Comparison, ExportedFile, compare_body, compare_field
 from palpate.export.field_tables import PROMISE, SURFACE, field_tables
 from palpate.export.wasm_core import WasmCore, wasmtime_module
 from palpate.export.weights_block import FIELD, WeightsBlock
 from palpate.files import write_file
 from palpate.format import script_json
 from palpate.output_files import require_outputs, with_seal
-from palpate.runtime.devices import device_traits
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import ContactBaseline, FieldSurrogate, Surrogate
 from palpate.surrogates.model_card import card_of
@@ -42,12 +42,16 @@ __all__ = ["ExportedPage", "export_html", "html_page"]
 STATIC = Path(__file__).parent / "static"
 # modes and moving nodes: the page sums the shape up itself
 DRAWN_BY_THE_PAGE = (FIELD + 4, FIELD + 6, FIELD + 7)
-LARGEST = 5_000_000  # bytes of a file, more than which no further field makes it
-DEEP = 2.0  # of the deepest trained depth, at which the body lets go
-RATE = 60.0  # Hz, of the pictures
+LARGEST = 5_000_000  # bytes of a file, beyond which no further field is added
+DEEP = 2.0  # depth at which the body lets go, over the deepest trained depth
+RATE = 60.0  # Hz, rate of the pictures
 _MARGIN = 20_000  # bytes for facts, card and the document around the parts
-MOVED = 0.1  # of the promise for a field: by how much rounding a place may move it
-FINEST = 2**-28  # of the body's size, least step of its places; without a field it is 2**-19
+MOVED = 0.1  # share of a field's promise, by which rounding a place may move it
+FINEST = 2**-28  # least step of places over the body's size; without a field it is 2**-19
+# how the built modules begin and end
+_IMPORT = re.compile(r'import\{([^{}]*)\}from"\./([^"/]+)";')
+_EXPORT = re.compile(r"export\{([^{}]*)\};?\s*$")
+_ALIAS = re.compile(r"([\w$]+) as ([\w$]+)")
 
 
 class _Settings(NamedTuple):
@@ -57,12 +61,9 @@ class _Settings(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ExportedPage:
+class ExportedPage(ExportedFile):
     """A page that was written, and how far it is from palpate."""
 
-    file: Path
-    hash: str  # SHA-256 of the weights
-    comparison: Comparison | None  # None where wasmtime is not installed, or nothing was to be compared
     left_out: tuple[str, ...] = ()  # fields too large for 5 MB, or on other nodes than the first
 
 
@@ -78,12 +79,9 @@ def export_html(
     require_outputs([path], endings=(".html", ".htm"), overwrite=overwrite)
     page = _Page.of(surrogate)
     comparison = page.compare() if check and wasmtime_module() is not None else None
-    if comparison is not None and not comparison.passed:
-        raise AccuracyError(
-            f"The page of {surrogate.name} does not answer as palpate does.",
-            why=str(comparison),
-            fix="Nothing was written. Report this with the model file.",
-        )
+    if comparison is not None:
+        fix = "Nothing was written. Report this with the model file."
+        comparison.require(f"The page of {surrogate.name} does", why="", fix=fix)
     file = write_file(Path(path), with_seal(path, page.text))
     return ExportedPage(file, page.block.hash, comparison, page.left_out)
 
@@ -253,7 +251,23 @@ def _without_modes(block: WeightsBlock) -> WeightsBlock:
 def _statics() -> tuple[str, str]:
     """Return style and script of every page."""
     style = (STATIC / "assets" / "page.css").read_text("utf-8")
-    return style, (STATIC / "assets" / "file.js").read_text("utf-8").replace("</script", "<\\/script")
+    chunks: dict[str, str] = {}
+    _add_chunk("file.js", chunks)
+    # a page from disk may load no modules: they become functions of one plain script
+    script = "\n".join(["(() => {", '"use strict";', "const chunks = {};", *chunks.values(), "})();"])
+    return style, script.replace("</script", "<\\/script")
+
+
+def _add_chunk(name: str, chunks: dict[str, str]) -> None:
+    """Add a built module as a function of the modules before it, after those that it imports."""
+    text = (STATIC / "assets" / name).read_text("utf-8")
+    imported = [match[2] for match in _IMPORT.finditer(text)]
+    for other in imported:
+        if other not in chunks:
+            _add_chunk(other, chunks)
+    text = _IMPORT.sub(lambda match: f"const{{{match[1].replace(' as ', ':')}}}=chunks['{match[2]}'];", text)
+    text = _EXPORT.sub(lambda match: "return{" + _ALIAS.sub(r"\2:\1", match[1]) + "};", text)
+    chunks[name] = f"chunks['{name}']=(()=>{{{text}}})();"
 
 
 def _document(name: str, parts: Mapping[str, str], card: str) -> str:

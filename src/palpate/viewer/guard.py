@@ -46,7 +46,7 @@ NO_TOKEN = f"""{EMPTY}
 <p>Whoever opens it can pull on the body, so it asks for the token of this start of palpate.</p>
 <p>Open the whole address that palpate printed in its terminal.</p>
 """
-MOST_REQUESTS = 64  # answered at a time; a browser has six connections to a server
+MOST_REQUESTS = 64  # requests answered at a time; a browser has six connections to a server
 REQUESTS, BURST = 100.0, 300.0  # requests per second in the long run, and at once; a page needs about ten
 WARNINGS = 20.0  # lines of the log about refusals at once, and one per second in the long run
 

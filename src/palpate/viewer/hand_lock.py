@@ -15,8 +15,8 @@ from palpate.viewer.messages import Hand, Hold
 __all__ = ["Command", "HandLock"]
 
 FORGOTTEN = 1.0  # s without a word from the holder until another page may take the hand
-LONGEST_PERIOD = 0.25  # s; a page may not promise itself out of the stall rule
-SHORTEST_PERIOD = 0.01
+LONGEST_PERIOD = 0.25  # s; a longer one would let a page promise itself out of the stall rule
+SHORTEST_PERIOD = 0.01  # s between two messages of a hand, at least
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from palpate.runtime.touchable import Touchable
 __all__ = ["IndentationDrawing", "yielding_in_words"]
 
 LEVELS = 33  # depths at which amplitudes are tabulated
-BEYOND = 1.5  # the last one, over the deepest trained depth
+BEYOND = 1.5  # last tabulated depth over the deepest trained one
 AT_ONCE = 256  # points whose shares are worked out together
 
 

@@ -260,98 +260,42 @@ class FieldInfo:
 
 @dataclass(frozen=True)
 class Line:
-    """A body held at one node and drawn as a line.
+    """A body held at one node and drawn as a line."""
 
-    Attributes
-    ----------
-    rest : (N, 3)
-        Rest positions of the nodes along the body's axis, m.
-    touch_node : int
-        The node that a hand holds.
-    nodes_of_interest : tuple of int
-        Nodes that the page marks.
-    travel : (2, 3)
-        Lower and upper corner of the box of the held node's offsets under all trained loads, m.
-    """
-
-    rest: tuple[Vec3, ...]
-    touch_node: int
-    nodes_of_interest: tuple[int, ...]
+    rest: tuple[Vec3, ...]  # (N, 3) rest positions of the nodes along the body's axis, m
+    touch_node: int  # the node that a hand holds
+    nodes_of_interest: tuple[int, ...]  # nodes that the page marks
+    # (2, 3) lower and upper corner of the box of the held node's offsets under all trained loads, m
     travel: tuple[Vec3, ...]
 
 
 @dataclass(frozen=True)
 class Hello(Json):
-    """A touchable body and its loop, once per connection, server to page.
+    """A touchable body and its loop, once per connection, server to page."""
 
-    Attributes
-    ----------
-    protocol : int
-        `PROTOCOL`: a page of another one reloads itself.
-    version : int
-        Counts the surrogates of one body: a later one takes the place of the one before while it is touched.
-    name : str
-        Of the body.
-    inputs, parameters : ranges
-        All inputs; those that the hand does not drive.
-    holds : bool
-        Whether the hand holds a node or a patch, and doesn't press a free probe.
-    radius : float
-        Of the probe, or of what is held, for drawing, m.
-    radius_parameter : int
-        The parameter that is the probe's radius; -1 where none is.
-    deepest : float
-        Deepest trained depth, or largest trained displacement of what is held, m.
-    force_max : float
-        Largest force of the trained region, N.
-    stiffness_max : float
-        Largest stiffness of the trained region, N/m.
-    centre : (3,)
-        The device's centre in the body's coordinates, m.
-    line : Line or null
-        Set where the body is drawn as a line, and not as a surface.
-    fields : quantities to colour by
-        The first moves the surface where it has three components; none where the file holds no field.
-    remembers : str
-        How the force relaxes, or indentations stay, in words; empty where neither does.
-    scale : float
-        Body metres per metre of hand.
-    workspace : float
-        Radius of the hand's workspace, m.
-    max_force : float
-        The force limit, N.
-    rate : float
-        Hz, what the loop aims at.
-    faults : tuple of str
-        Words for fault codes, by code.
-    device : str
-        What the device calls itself that the hand holds; empty where the page's own hand touches the body.
-    meta : mapping
-        What the model's file says of its making.
-    """
-
-    protocol: int
+    protocol: int  # `PROTOCOL`: a page of another one reloads itself
+    # counts the surrogates of one body: a later one takes the place of the one before while it is touched
     version: int
-    name: str
+    name: str  # of the body
     inputs: tuple[RangeInfo, ...]
-    parameters: tuple[RangeInfo, ...]
-    holds: bool
-    radius: float
-    radius_parameter: int
-    deepest: float
-    force_max: float
-    stiffness_max: float
-    centre: Vec3
-    line: Line | None
-    fields: tuple[FieldInfo, ...]
-    remembers: str
-    scale: float
-    workspace: float
-    max_force: float
-    rate: float
-    faults: tuple[str, ...]
-    device: str
-    meta: Mapping[str, Any]
+    parameters: tuple[RangeInfo, ...]  # the inputs that the hand does not drive
+    holds: bool  # whether the hand holds a node or a patch, and doesn't press a free probe
+    radius: float  # of the probe, or of what is held, for drawing, m
+    radius_parameter: int  # the parameter that is the probe's radius; -1 where none is
+    deepest: float  # deepest trained depth, or largest trained displacement of what is held, m
+    force_max: float  # largest force of the trained region, N
+    stiffness_max: float  # largest stiffness of the trained region, N/m
+    centre: Vec3  # (3,) the device's centre in the body's coordinates, m
+    line: Line | None  # set where the body is drawn as a line, and not as a surface
+    fields: tuple[FieldInfo, ...]  # to colour by; the first moves the surface where it has three components
+    remembers: str  # how the force relaxes, or indentations stay, in words; empty where neither does
+    scale: float  # body metres per metre of hand
+    workspace: float  # radius of the hand's workspace, m
+    max_force: float  # the force limit, N
+    rate: float  # Hz, what the loop aims at
+    faults: tuple[str, ...]  # words for fault codes, by code
+    device: str  # what it calls itself that the hand holds; empty where the page's own hand touches the body
+    meta: Mapping[str, Any]  # what the model's file says of its making
 
 
 @dataclass(frozen=True)
@@ -364,37 +308,20 @@ class StepInfo:
 
 @dataclass(frozen=True)
 class Shown(Json):
-    """A body to look at, server to page.
+    """A body to look at, server to page."""
 
-    Attributes
-    ----------
-    protocol : int
-        `PROTOCOL`: a page of another one reloads itself.
-    name : str
-        Title of the page.
-    fields : tuple of FieldInfo
-        Quantities to colour by; the first is the displacement.
-    steps : tuple of StepInfo
-        Its states, in order.
-    reach : float
-        Largest displacement of all states, m.
-    """
-
-    protocol: int
-    name: str
-    fields: tuple[FieldInfo, ...]
-    steps: tuple[StepInfo, ...]
-    reach: float
+    protocol: int  # `PROTOCOL`: a page of another one reloads itself
+    name: str  # title of the page
+    fields: tuple[FieldInfo, ...]  # quantities to colour by; the first is the displacement
+    steps: tuple[StepInfo, ...]  # its states, in order
+    reach: float  # largest displacement of all states, m
 
 
 @dataclass(frozen=True)
 class Notice(Json):
     """An event in plain words, server to page.
 
-    Attributes
-    ----------
-    what, why, fix : str
-        As in every error of palpate.
+    What, why and fix are those of every error of palpate.
     """
 
     what: str
@@ -404,71 +331,35 @@ class Notice(Json):
 
 @dataclass(frozen=True)
 class Recording(Json):
-    """The recording of the touch, server to page.
+    """The recording of the touch, server to page."""
 
-    Attributes
-    ----------
-    active : bool
-        Whether it runs.
-    file : str
-        Its name in the folder of the server; empty where there was none.
-    seconds, size : float
-        Duration, s, and bytes so far.
-    lost : int
-        Number of ticks that could not be written down in time.
-    problem : str
-        Why it could not begin, or has stopped by itself; otherwise empty.
-    """
-
-    active: bool
-    file: str
-    seconds: float
-    size: float
-    lost: int
-    problem: str
+    active: bool  # whether it runs
+    file: str  # its name in the folder of the server; empty where there was none
+    seconds: float  # duration, s
+    size: float  # bytes so far
+    lost: int  # number of ticks that could not be written down in time
+    problem: str  # why it could not begin, or has stopped by itself; otherwise empty
 
 
 @dataclass(frozen=True)
 class Reason(Json):
-    """The reason why there is no force, or lately was none, server to page.
+    """The reason why there is no force, or lately was none, server to page."""
 
-    Attributes
-    ----------
-    now : str
-        Why there is none now, and what brings it back; empty where it may flow.
-    stopped : bool
-        Whether a person has stopped it, and must end that.
-    dropped : str
-        What made the force drop last; empty where nothing has.
-    ago : float
-        How long ago that was, s.
-    """
-
-    now: str
-    stopped: bool
-    dropped: str
-    ago: float
+    now: str  # why there is none now, and what brings it back; empty where it may flow
+    stopped: bool  # whether a person has stopped it, and must end that
+    dropped: str  # what made the force drop last; empty where nothing has
+    ago: float  # how long ago that was, s
 
 
 @dataclass(frozen=True)
 class Feel(Json):
-    """Cautions about what is felt on the device, such as of a body too stiff for its rate and delay, server to page.
+    """Cautions about what is felt on the device, such as of a body too stiff for its rate and delay, server to page."""
 
-    Attributes
-    ----------
-    body, limit, felt : float
-        The body's largest stiffness, the largest that is passive there, and the largest that the hand feels, N/m in
-        hand metres.
-    override : bool
-        Whether the user has asked for the body as stiff as it is.
-    words : str
-        All of it in sentences, with the figures that the limit comes from; empty where there is nothing to say.
-    """
-
-    body: float
-    limit: float
-    felt: float
-    override: bool
+    body: float  # the body's largest stiffness, N/m in hand metres
+    limit: float  # the largest stiffness that is passive there, N/m
+    felt: float  # the largest stiffness that the hand feels, N/m
+    override: bool  # whether the user has asked for the body as stiff as it is
+    # all of it in sentences, with the figures that the limit comes from; empty where there is nothing to say
     words: str
 
 

@@ -27,7 +27,7 @@ from palpate.viewer.trust_map import trust_map
 __all__ = ["HandSettings", "LineDrawing", "PageModel", "swing", "vector"]
 
 FREQUENCY = 2.0  # Hz, a pace that the eye can follow; the model's file holds no mass
-DAMPING = 0.25  # of critical: at rest again within two seconds
+DAMPING = 0.25  # share of the critical damping: at rest again within two seconds
 STILL = 1e-3  # share of the last shape below which the body counts as at rest
 
 _NO_TOUCH: dict[str, Any] = {

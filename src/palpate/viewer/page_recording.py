@@ -18,8 +18,8 @@ from palpate.viewer.messages import Recording
 
 __all__ = ["LONGEST", "PageRecording", "Recordable"]
 
-LONGEST = 3600.0  # s of a recording: one that was forgotten must not fill the disk
-_NEWS = 1.0  # s between two words on a recording that runs
+LONGEST = 3600.0  # s of a recording: a forgotten one must not fill the disk
+_NEWS = 1.0  # s between two messages on a recording that runs
 
 
 class Recordable(Protocol):

@@ -125,90 +125,43 @@ class MaterialInfo:
 
 @dataclass(frozen=True)
 class PartNews(Json):
-    """The stage of the work on a part, server to page.
+    """The stage of the work on a part, server to page."""
 
-    Attributes
-    ----------
-    protocol : int
-        `PROTOCOL`: a page of another one reloads itself.
-    name : str
-        Of the part.
-    stage : str
-        ``reading`` the part, ``choosing``, ``working`` or ``ended``.
-    words : str
-        What goes on, in a sentence.
-    version : int
-        Version of the body that can be touched; 0 where there is none yet.
-    part : int
-        Counts the parts that are shown: another unit makes another part of a file. 0 where there is none yet.
-    """
-
-    protocol: int
-    name: str
-    stage: str
-    words: str
-    version: int
+    protocol: int  # `PROTOCOL`: a page of another one reloads itself
+    name: str  # of the part
+    stage: str  # ``reading`` the part, ``choosing``, ``working`` or ``ended``
+    words: str  # what goes on, in a sentence
+    version: int  # of the body that can be touched; 0 where there is none yet
+    # counts the parts that are shown: another unit makes another part of a file; 0 where there is none yet
     part: int
 
 
 @dataclass(frozen=True)
 class PartFacts(Json):
-    """A part and the choices that were made for it, server to page.
+    """A part and the choices that were made for it, server to page."""
 
-    Attributes
-    ----------
-    file, unit : str
-        Name of the file, and unit of its numbers; empty where the file states it.
-    units : tuple of str
-        Units in which the numbers could be taken instead; none where the file states its own.
-    size : (3,)
-        Lengths of the box around it, m.
-    faces : tuple of FaceInfo
-        Faces of the file, or parts of its surface between sharp edges.
-    whole : bool
-        Whether faces can be picked as a whole only.
-    materials : tuple of MaterialInfo
-        Materials that can be asked for by name.
-    laws : tuple of str
-        Laws that take Young's modulus and Poisson's ratio.
-    choices : StartWish
-        The choices made so far, as texts with units.
-    notes : tuple of str
-        What else there is to say, in sentences.
-    """
-
-    file: str
-    unit: str
-    units: tuple[str, ...]
-    size: Vec3
-    faces: tuple[FaceInfo, ...]
-    whole: bool
-    materials: tuple[MaterialInfo, ...]
-    laws: tuple[str, ...]
-    choices: Mapping[str, str]
-    notes: tuple[str, ...]
+    file: str  # its name
+    unit: str  # of the file's numbers; empty where the file states it
+    units: tuple[str, ...]  # in which the numbers could be taken instead; none where the file states its own
+    size: Vec3  # (3,) lengths of the box around it, m
+    faces: tuple[FaceInfo, ...]  # of the file, or parts of its surface between sharp edges
+    whole: bool  # whether faces can be picked as a whole only
+    materials: tuple[MaterialInfo, ...]  # that can be asked for by name
+    laws: tuple[str, ...]  # that take Young's modulus and Poisson's ratio
+    choices: Mapping[str, str]  # made so far, as texts with units, by the names of `StartWish`
+    notes: tuple[str, ...]  # what else there is to say, in sentences
 
 
 @dataclass(frozen=True)
 class StartWish(Json):
-    """The choices with which the solves shall begin, page to server. Quantities are texts with units.
+    """The choices with which the solves shall begin, page to server. Quantities are texts with units."""
 
-    Attributes
-    ----------
-    material : str
-        Name of a material; empty where law and constants are given.
-    law, young, poisson : str
-        Law, Young's modulus and Poisson's ratio of an own material.
-    radius, depth : str
-        Of the ball, and how deep it presses at most.
-    """
-
-    material: str
-    law: str
-    young: str
-    poisson: str
-    radius: str
-    depth: str
+    material: str  # name of a material; empty where law and constants are given
+    law: str  # of an own material
+    young: str  # Young's modulus of an own material
+    poisson: str  # Poisson's ratio of an own material
+    radius: str  # of the ball
+    depth: str  # how deep the ball presses at most
 
 
 @dataclass(frozen=True)
@@ -227,31 +180,14 @@ class Answer(Json):
 
 @dataclass(frozen=True)
 class LearningProgress(Json):
-    """The state of solving and learning, server to page.
+    """The state of solving and learning, server to page."""
 
-    Attributes
-    ----------
-    phase : str
-        What goes on, in words.
-    solves : int
-        Solves that are done.
-    target : float
-        Relative force error at the 95th percentile that ends the work.
-    error_median, error_p95 : float or null
-        Relative force error against solves that were kept apart, of the body that is touched; null before the first.
-    places : tuple of (3,)
-        Places on the surface where solves are done, m.
-    seconds : float
-        Time since the start, s.
-    report : bool
-        Whether there is a report at ``/report``.
-    """
-
-    phase: str
-    solves: int
-    target: float
+    phase: str  # what goes on, in words
+    solves: int  # number that are done
+    target: float  # relative force error at the 95th percentile that ends the work
+    # relative force error against solves that were kept apart; null before the first body
     error_median: float | None
-    error_p95: float | None
-    places: tuple[Vec3, ...]
-    seconds: float
-    report: bool
+    error_p95: float | None  # 95th percentile of the same
+    places: tuple[Vec3, ...]  # (k, 3) places on the surface where solves are done, m
+    seconds: float  # time since the start, s
+    report: bool  # whether there is a report at ``/report``

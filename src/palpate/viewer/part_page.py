@@ -21,7 +21,7 @@ import threading
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from starlette.applications import Starlette
@@ -48,19 +48,19 @@ from palpate.viewer.part_messages import (
     StartWish,
     UnitWish,
 )
-from palpate.viewer.server import body_routes
+from palpate.viewer.server import body_routes, driver_in_words
 from palpate.viewer.session import Session
 from palpate.viewer.shown_part import PartChoices, ShownPart, choices_of
 from palpate.viewer.solve_dots import on_surface
 from palpate.viewer.traffic import Bucket
-from palpate.viewer.web_server import STATIC, LocalServer, local_application
+from palpate.viewer.web_server import LocalServer, ServerOptions, local_application, skeleton
 from palpate.viewer.wire import Json
 
 __all__ = ["PartPage", "Progress", "serve_part"]
 
 logger = logging.getLogger("palpate.viewer")
 
-MOST_PAGES = 32
+MOST_PAGES = 32  # pages that are served at a time
 PATIENCE = 1.0  # s that a page has to take news
 # messages of a page, per second and at once; a start after long brushing takes fifty
 MESSAGES, MESSAGES_AT_ONCE = 20.0, 200.0
@@ -133,7 +133,7 @@ class PartPage(LocalServer):
         `PalpateError`, which the page answers with; otherwise it returns at once, and the work goes on elsewhere.
     on_unit : callable, optional
         Gets another unit of the file's numbers, and returns the part as it is then; by default the unit stays.
-    port, host, strict_port, token
+    port, host, strict_port, token : int, str, bool, bool
         As for `Viewer`.
     device : str
         The real-time process's device: ``page`` is the page's own hand.
@@ -156,14 +156,11 @@ class PartPage(LocalServer):
         *,
         on_start: Callable[[PartChoices], object],
         on_unit: Callable[[str], ShownPart] | None = None,
-        port: int = 8080,
-        host: str = "127.0.0.1",
-        strict_port: bool = False,
-        token: bool = True,
         device: str = "page",
         recordings: str | os.PathLike[str] = ".",
+        **server: Unpack[ServerOptions],
     ) -> None:
-        super().__init__(port, host, strict_port=strict_port, token=token)
+        super().__init__(**server)
         self.name, self._on_start, self._on_unit = name, on_start, on_unit
         self._device, self._recordings = device, Path(recordings)
         self.stopped, self.visited = threading.Event(), threading.Event()
@@ -238,8 +235,7 @@ class PartPage(LocalServer):
     def _open(self, model: PageModel, path: str | os.PathLike[str]) -> None:
         """Start the real-time process, and a session for its pages."""
         self.loop = self._closing.enter_context(LoopProcess(path, device=self._device))
-        name = self._device.partition(":")[0]
-        driver = "" if name == "page" else f"the device {name}"
+        driver = driver_in_words(self._device)
         self._session = Session(model, self.loop, recordings=self._recordings, device=driver)
         self._do(self._watch(self._session))
 
@@ -262,8 +258,7 @@ class PartPage(LocalServer):
         return local_application([*self._routes(), *body_routes(lambda: self._session)], lifespan=lifespan)
 
     def _routes(self) -> list[BaseRoute]:
-        skeleton = (STATIC / "index.html").read_text(encoding="utf-8")
-        html = skeleton.replace('data-mode="touch"', 'data-mode="part"')
+        html = skeleton("part")
 
         def part() -> ShownPart:
             if self._part is None:
@@ -417,17 +412,7 @@ class PartPage(LocalServer):
 
 
 def serve_part(
-    name: str,
-    *,
-    on_start: Callable[[PartChoices], object],
-    on_unit: Callable[[str], ShownPart] | None = None,
-    part: ShownPart | None = None,
-    port: int = 8080,
-    host: str = "127.0.0.1",
-    strict_port: bool = False,
-    token: bool = True,
-    device: str = "page",
-    recordings: str | os.PathLike[str] = ".",
+    name: str, *, on_start: Callable[[PartChoices], object], part: ShownPart | None = None, **options: Any
 ) -> PartPage:
     """Start the page of a part; it can be opened when this returns.
 
@@ -445,17 +430,7 @@ def serve_part(
     -----
     The other parameters and the errors are those of `PartPage`, which is a context manager.
     """
-    page = PartPage(
-        name,
-        on_start=on_start,
-        on_unit=on_unit,
-        port=port,
-        host=host,
-        strict_port=strict_port,
-        token=token,
-        device=device,
-        recordings=recordings,
-    ).start()
+    page = PartPage(name, on_start=on_start, **options).start()
     if part is not None:
         page.show_part(part)
     return page

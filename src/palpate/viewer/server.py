@@ -14,6 +14,7 @@ import functools
 import os
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
+from typing import Unpack
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -29,10 +30,10 @@ from palpate.surrogates import Surrogate
 from palpate.viewer.compression import BinaryAnswers
 from palpate.viewer.page_model import PageModel
 from palpate.viewer.session import Session
-from palpate.viewer.web_server import LocalServer, local_application, wait_until_interrupted
+from palpate.viewer.web_server import LocalServer, ServerOptions, local_application, wait_until_interrupted
 from palpate.viewer.wire import Binary
 
-__all__ = ["Viewer", "application", "body_routes", "serve"]
+__all__ = ["Viewer", "ViewerOptions", "application", "body_routes", "driver_in_words", "serve"]
 
 
 def application(session: Session) -> Starlette:
@@ -97,10 +98,23 @@ def body_routes(session: Callable[[], Session | None]) -> list[BaseRoute]:
     ]
 
 
-def _driver(device: str) -> str:
+def driver_in_words(device: str) -> str:
     """Return the device that holds the hand, in words; empty for a page's own hand."""
     name = device.partition(":")[0]
     return "" if name == "page" else f"the device {name}"
+
+
+class ViewerOptions(ServerOptions, total=False):
+    """Where a body is served, and what moves the hand on it; as `Viewer` tells of them."""
+
+    recordings: str | os.PathLike[str]
+    replay: str | os.PathLike[str] | None
+    device: str
+    rate: float
+    max_force: float | None
+    unsoftened: bool
+    controller: bool
+    dead_man: bool
 
 
 class Viewer(LocalServer):
@@ -154,20 +168,17 @@ class Viewer(LocalServer):
         self,
         model: Surrogate | str | os.PathLike[str],
         *,
-        port: int = 8080,
-        host: str = "127.0.0.1",
+        recordings: str | os.PathLike[str] = ".",
+        replay: str | os.PathLike[str] | None = None,
         device: str = "page",
         rate: float = 1000.0,
         max_force: float | None = None,
-        strict_port: bool = False,
-        token: bool = True,
-        recordings: str | os.PathLike[str] = ".",
-        replay: str | os.PathLike[str] | None = None,
         unsoftened: bool = False,
         controller: bool = True,
         dead_man: bool = False,
+        **server: Unpack[ServerOptions],
     ) -> None:
-        super().__init__(port, host, strict_port=strict_port, token=token)
+        super().__init__(**server)
         self._source = model
         if isinstance(model, str | os.PathLike):
             self.model = load_touchable(model)
@@ -183,7 +194,7 @@ class Viewer(LocalServer):
             controller=controller,
             dead_man=dead_man,
         )
-        self._driver = "a recorded touch" if replay is not None else _driver(device)
+        self._driver = "a recorded touch" if replay is not None else driver_in_words(device)
         self._recordings = Path(recordings) if replay is None else None
 
     @property
@@ -208,20 +219,9 @@ class Viewer(LocalServer):
 def serve(
     model: Surrogate | str | os.PathLike[str],
     *,
-    port: int = 8080,
-    host: str = "127.0.0.1",
-    device: str = "page",
-    rate: float = 1000.0,
-    max_force: float | None = None,
-    strict_port: bool = False,
-    token: bool = True,
-    recordings: str | os.PathLike[str] = ".",
-    replay: str | os.PathLike[str] | None = None,
-    unsoftened: bool = False,
-    controller: bool = True,
-    dead_man: bool = False,
     open_browser: bool = False,
     on_ready: Callable[[Viewer], object] | None = None,
+    **options: Unpack[ViewerOptions],
 ) -> Viewer:
     """Show a body in the browser until interrupted (Ctrl-C) or terminated; in a notebook, go on at once.
 
@@ -242,20 +242,6 @@ def serve(
     -----
     The other parameters and the errors are those of `Viewer`.
     """
-    viewer = Viewer(
-        model,
-        port=port,
-        host=host,
-        device=device,
-        rate=rate,
-        max_force=max_force,
-        strict_port=strict_port,
-        token=token,
-        recordings=recordings,
-        replay=replay,
-        unsoftened=unsoftened,
-        controller=controller,
-        dead_man=dead_man,
-    )
+    viewer = Viewer(model, **options)
     wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)
     return viewer

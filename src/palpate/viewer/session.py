@@ -49,15 +49,16 @@ __all__ = ["NOT_SOFTENED", "LoopLike", "Page", "Session", "softening"]
 
 logger = logging.getLogger("palpate.viewer")
 
-MOST_CREDITS = 4
+MOST_CREDITS = 4  # frames that a page may have outstanding
 SHORTEST = 1.0 / 125.0  # s between frames to one page: no display that matters is faster
 STALE = 0.25  # s without a tick until the loop counts as frozen
 RATE_KNOWN = 0.5  # s after the loop has rested until its rate is that of a touched body again
 WATCH = 0.1  # s between looks at the real-time process
 PATIENCE = 1.0  # s that a page has to take news of all pages
 GRACE = 0.5  # s; a signal that ends the whole program may reach the real-time process first
-MOST_PAGES = 32
-MESSAGES, MESSAGES_AT_ONCE = 1000.0, 250.0  # of a page, per second and at once; a display at 360 Hz needs 485
+MOST_PAGES = 32  # pages that are served at a time
+# messages of a page, per second and at once; a display at 360 Hz needs 485
+MESSAGES, MESSAGES_AT_ONCE = 1000.0, 250.0
 SLICE = 0.02  # s; a page that is owed less than that is heard on
 MAX_U32 = 2**32 - 1
 _NO_FAULT = (Fault.NONE, Fault.INPUT_STALLED, Fault.STOPPED)

@@ -21,10 +21,8 @@ from palpate.viewer.surfaces import Split, outer_triangles, split
 
 __all__ = ["ShownBody", "ShownStep", "body_of", "body_of_dataset", "body_of_file"]
 
-_CORNERS = (
-    ("tetra", 4),
-    ("triangle", 3),
-)  # kinds of cells, and their corners: further nodes lie between these
+# kinds of cells, and their corners: further nodes lie between these
+_CORNERS = (("tetra", 4), ("triangle", 3))
 VON_MISES, STRETCH = "von Mises stress", "largest principal stretch"
 
 
@@ -198,7 +196,7 @@ def _unreadable(path: Path, why: str) -> FileFormatError:
     )
 
 
-MOST_STEPS = 400  # of a dataset: a longer slider can't be moved by one
+MOST_STEPS = 400  # steps of a dataset: on a longer slider single ones can't be reached
 
 
 def body_of_file(path: Path, name: str = "") -> ShownBody:

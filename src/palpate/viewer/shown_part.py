@@ -15,14 +15,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.units import parse_quantity
 from palpate.viewer.messages import Surface
-from palpate.viewer.part_messages import (
-    FaceInfo,
-    MaterialInfo,
-    PartFaces,
-    PartFacts,
-    Role,
-    StartWish,
-)
+from palpate.viewer.part_messages import FaceInfo, MaterialInfo, PartFaces, PartFacts, Role, StartWish
 from palpate.viewer.surfaces import split
 
 __all__ = ["PartChoices", "ShownPart", "as_wish", "choices_of"]

@@ -17,9 +17,9 @@ CREASE = math.cos(math.radians(40.0))
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 ALONG = 48  # cells of a relief along either side
-STEPS = 30  # of Newton's method down to the surface
-TRUE = 1e-3  # of the probe's radius: how near the surface a point of it must lie
-NEAR = 0.1  # of the probe's radius: a triangle as near as this to the touched surface is part of it
+STEPS = 30  # steps of Newton's method down to the surface
+TRUE = 1e-3  # distance over the probe's radius, within which a drawn point lies on the surface
+NEAR = 0.1  # distance over the probe's radius, within which a triangle belongs to the touched surface
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,8 +29,8 @@ __all__ = ["Bucket", "Closable", "PatientHttp", "PatientWebSocket", "Turns", "Wa
 
 Clock = Callable[[], float]
 
-SHARE = 0.5  # of the thread's time, for pictures; the rest is the hand's
-HALF_OPEN = 64  # connections without a whole request
+SHARE = 0.5  # share of the thread's time for pictures; the rest is the hand's
+HALF_OPEN = 64  # connections without a whole request, at most
 HEADERS_WITHIN = 5.0  # s from the start of a connection, or of a request, to the end of its headers
 CONTROLS, CONTROLS_AT_ONCE = 20.0, 100.0  # pings and fragments of a websocket, per second and at once
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["NOT_TOUCHED", "NOT_TRAINED", "trust_map"]
 
-NOT_TOUCHED, NOT_TRAINED = -1.0, -2.0
-SHARE = 0.5  # of the deepest trained depth, at which the ball is at each point
+NOT_TOUCHED, NOT_TRAINED = -1.0, -2.0  # values in place of a deviation
+SHARE = 0.5  # depth of the ball at each point, over the deepest trained depth
 TYPICAL = 95  # percentile of the deviations at which the colour scale ends
 
 

@@ -22,7 +22,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar, cast
+from typing import Any, Self, TypedDict, TypeVar, cast
 
 import uvicorn
 from starlette.applications import Starlette
@@ -37,15 +37,17 @@ __all__ = [
     "STATIC",
     "TRIES",
     "LocalServer",
+    "ServerOptions",
     "free_port",
     "in_notebook",
     "listen",
     "local_application",
+    "skeleton",
     "wait_until_interrupted",
     "way_in",
 ]
 
-TRIES = 50  # a machine with that many servers side by side wants to be told
+TRIES = 50  # ports tried: a machine with that many servers side by side should hear of it
 READ = 4096  # bytes that the system keeps of what a page sends and is not read yet; it may double them
 
 
@@ -102,33 +104,32 @@ START = 10.0  # s until the server must listen
 BACKLOG = 32  # connections that are taken at once, between two looks at what pages sent
 
 
+def skeleton(mode: str) -> str:
+    """Return the document of all pages for one of them: touch, shown or part."""
+    return (STATIC / "index.html").read_text("utf-8").replace('data-mode="touch"', f'data-mode="{mode}"')
+
+
 def local_application(routes: Sequence[BaseRoute], **options: Any) -> Starlette:
     """Return a web application of these routes, which come before the files of the built pages."""
     files = Mount("/", StaticFiles(directory=STATIC, html=True))
     return Starlette(routes=[*routes, files], **options)
 
 
+class ServerOptions(TypedDict, total=False):
+    """Where a page is served."""
+
+    port: int  # the port wanted; 0 takes any free one
+    host: str  # 127.0.0.1, localhost or ::1: pages are served to this machine only
+    strict_port: bool  # whether a busy port is an error; otherwise the next free one is taken
+    token: bool  # whether the page opens only with the token that stands in `url`
+
+
 class LocalServer(ABC):
-    """A page at `url` while the context lasts; the base of what serves one.
+    """A page at `url` while the context lasts; the base of what serves one, at `port` once started."""
 
-    Parameters
-    ----------
-    port : int
-        The port wanted; 0 takes any free one.
-    host : str
-        ``127.0.0.1``, ``localhost`` or ``::1``: it serves this machine only.
-    strict_port : bool
-        Whether a busy port is an error; otherwise the next free one is taken.
-    token : bool
-        Whether a page must show the token that stands in `url`.
-
-    Attributes
-    ----------
-    port : int
-        The port taken, once started.
-    """
-
-    def __init__(self, port: int, host: str, *, strict_port: bool, token: bool) -> None:
+    def __init__(
+        self, port: int = 8080, host: str = "127.0.0.1", *, strict_port: bool = False, token: bool = True
+    ) -> None:
         self.host, self.port = host, port
         self._token = Token() if token else None
         self._wanted = (port, host, strict_port)
@@ -161,17 +162,7 @@ class LocalServer(ABC):
         """Return the web application; what it needs until the end enters `_closing`."""
 
     def start(self) -> Self:
-        """Start the server and all that it needs; the page can be opened when this returns. Harmless when repeated.
-
-        Raises
-        ------
-        PortInUseError
-            If no port is free, or the one wanted isn't and `strict_port` is set.
-        UsageError
-            If the host, the port or a device can't be.
-        DeviceError
-            If the server, or the real-time process behind it, doesn't start.
-        """
+        """Start the server and all that it needs; the page can be opened when this returns. Harmless when repeated."""
         if self._thread is not None:
             return self
         try:

@@ -14,10 +14,10 @@ import pytest
 from palpate import read_results
 from palpate.dataset.measured import read_measurements
 from palpate.dataset.readers.vtk_files import read_series
+from palpate.devices.tick_record import TICK
+from palpate.devices.trace_file import TraceWriter, read_trace
 from palpate.errors import FileFormatError, PalpateError
 from palpate.learning.learning_history import History
-from palpate.runtime.recording import TICK
-from palpate.runtime.trace_file import TraceWriter, read_trace
 from palpate.study.toml import read_study
 from palpate.supervised import read_in_child
 from palpate.tables import read_table

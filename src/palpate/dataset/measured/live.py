@@ -29,20 +29,14 @@ from typing import BinaryIO
 from palpate.dataset.measured.measured_columns import Columns, Measurements
 from palpate.errors import UsageError
 
-__all__ = [
-    "VERSION",
-    "Connection",
-    "greeting",
-    "lines_of",
-    "measurements",
-]
+__all__ = ["VERSION", "Connection", "greeting", "lines_of", "measurements"]
 
 VERSION = "1"
 _DEFAULT = "t,x,y,z,fx,fy,fz"
 _LENGTHS, _FORCES = ("x", "y", "z"), ("fx", "fy", "fz")
 _EXAMPLE = f"palpate {VERSION} length=mm force=N time=s"
 
-_LONGEST = 1000  # bytes of a line
+_LONGEST = 1000  # bytes of a line, at most
 _WAITING = 10_000  # lines read and not yet taken; the sender then waits
 _ANSWERS = 1.0  # s that an answer may take; who does not read them gets none any more
 
@@ -157,13 +151,7 @@ def measurements(lines: Iterable[str], answer: Callable[[str], None]) -> Iterato
 
 
 def greeting(words: list[str]) -> Columns:
-    """Read the columns that a greeting announces.
-
-    Raises
-    ------
-    UsageError
-        If it is none, of another version, or lacks a unit.
-    """
+    """Read the columns that a greeting announces, and refuse one of another version or without a unit."""
     if words[:2] != ["palpate", VERSION]:
         raise UsageError("Units come first.", fix=f"Begin with: {_EXAMPLE}")
     pairs = [word.partition("=")[::2] for word in words[2:]]

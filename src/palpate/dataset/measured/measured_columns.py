@@ -113,36 +113,16 @@ class Measurements:
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns of a table or a stream, in order.
+    """Columns of a table or a stream, in order."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the columns, in lower case.
-    scales : tuple of float
-        Size of each column's unit in SI units.
-    """
-
-    names: tuple[str, ...]
-    scales: tuple[float, ...]
+    names: tuple[str, ...]  # in lower case
+    scales: tuple[float, ...]  # size of each column's unit in SI units
 
     @classmethod
     def of(cls, names: Sequence[str], units: Mapping[str, str], *, placed: bool = False) -> Columns:
-        """Make columns from their names as written and the unit of each.
+        """Make columns from their names as written, in any case, and the unit of each.
 
-        Parameters
-        ----------
-        names : sequence of str
-            Names in the order of the columns, in any case.
-        units : mapping of str to str
-            Unit of each column by its name; units of other names are ignored.
-        placed : bool
-            True where the place of pressed depths is known already.
-
-        Raises
-        ------
-        UsageError
-            If a column is unknown, named twice or without a unit, or they make no measurement.
+        Units of other names are ignored. `placed` is True where the place of pressed depths is known already.
         """
         lower = tuple(name.strip().lower() for name in names)
         unit_of = {name.strip().lower(): unit.strip() for name, unit in units.items()}
@@ -169,13 +149,7 @@ class Columns:
         return "depth" in self.names
 
     def values(self, cells: Sequence[str]) -> dict[str, float]:
-        """Read the numbers of one row, in SI units, by name.
-
-        Raises
-        ------
-        UsageError
-            If there are too many or too few cells, or one of them is no finite number.
-        """
+        """Read the numbers of one row, in SI units, by name."""
         if len(cells) != len(self.names):
             raise UsageError(
                 f"{len(cells)} values stand where {len(self.names)} belong.",

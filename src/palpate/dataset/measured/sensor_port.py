@@ -21,7 +21,7 @@ from palpate.errors import DeviceError, PortInUseError, UsageError
 __all__ = ["listening"]
 
 _STRANGERS = 16  # connections whose first line is awaited; the oldest goes first
-_FIRST_LINE = 5.0  # s that it may take
+_FIRST_LINE = 5.0  # s that the first line may take
 
 
 @contextlib.contextmanager

@@ -61,13 +61,7 @@ def name_and_unit(text: str) -> tuple[str, str | None]:
 
 
 def read_npz(path: Path) -> Results:
-    """Read the arrays of an ``.npz`` file.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged, holds pickled objects, or its arrays have different numbers of cases or places.
-    """
+    """Read the arrays of an ``.npz`` file; they must have equal numbers of cases or places, and no pickled objects."""
     arrays = _arrays(path)
     points, triangles = arrays.pop(POINTS, None), arrays.pop(TRIANGLES, None)
     notes: list[str] = []
@@ -149,15 +143,7 @@ def _places(path: Path, count: int, points: np.ndarray | None, triangles: np.nda
 
 
 def read_parquet(path: Path) -> Results:
-    """Read the columns of numbers of a Parquet table; a unit may also stand in a field's metadata as ``unit``.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is damaged or has no rows.
-    UsageError
-        If PyArrow isn't installed.
-    """
+    """Read the columns of numbers of a Parquet table; a unit may also stand in a field's metadata as ``unit``."""
     if importlib.util.find_spec("pyarrow") is None:
         raise UsageError(
             f"{path} can't be read without PyArrow.", fix="Install it: pip install 'palpate[parquet]'"

@@ -37,9 +37,8 @@ PURE = ("strains", "mechanical strains", "equivalent plastic strain")
 _HEAD = re.compile(
     r"^\s*(?P<title>[A-Za-z][^(]*?)\s*(?:\((?P<parts>[^)]*)\)\s*)?for set\s*(?P<set>\S+) and time\s+(?P<time>\S+)\s*$"
 )
-_BARE = {
-    "center of gravity": ("x", "y", "z")
-}  # one row without a number, whose components the head leaves out
+# titles of one row without a number, whose components the head leaves out
+_BARE = {"center of gravity": ("x", "y", "z")}
 _MODE = re.compile(r"^\s*E I G E N V A L U E +N U M B E R\s")  # every mode is a case, all at one time
 _KEYS = {"elem", "element", "node", "integ.pnt."}
 _NUMBER = re.compile(
@@ -74,13 +73,8 @@ def is_dat(head: str) -> bool:
 def read_dat(path: Path) -> Results:
     """Read the printed results of CalculiX.
 
-    Columns are called ``TITLE.COMPONENT of SET``, such as ``total force.fz of TOP``; of one component alone
-    ``internal energy of BODY``. Each time is a case.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is cut short or damaged, or holds no table of a set.
+    Columns are called ``TITLE.COMPONENT of SET``, such as ``total force.fz of TOP``; of one component alone ``internal
+    energy of BODY``. Each time is a case.
     """
     cases: list[tuple[float, dict[str, _Table]]] = []
     table: _Table | None = None

@@ -31,9 +31,8 @@ MEASURES = {
 """Formulas of the units of blocks, by their names."""
 
 PURE = frozenset({"TOSTRAIN", "MESTRAIN", "PE"})
-IGNORED = frozenset(
-    {"ERROR"}
-)  # an estimate of the discretisation's error in per cent, of no use beside a mesh
+# an estimate of the discretisation's error in per cent, of no use beside a mesh
+IGNORED = frozenset({"ERROR"})
 
 # number of nodes and kind of each type of element
 _TYPES = {
@@ -119,11 +118,6 @@ def read_frd(path: Path) -> Results:
     """Read a result file of CalculiX.
 
     Columns are called ``NAME.COMPONENT``, such as ``DISP.D1`` and ``STRESS.SZX``. Each increment is a case.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is cut short or damaged, or has no nodes or no results.
     """
     cursor, read = _Cursor(path, read_bytes(path)), _File()
     step, increment = 0, 0

@@ -20,7 +20,7 @@ from palpate.unit_text import si_conversion
 __all__ = ["chosen_columns", "find_columns", "index_of_place", "places_in_metres"]
 
 _PART = re.compile(r"^(?P<base>.*?)\.(?P<part>\w+)(?P<set> of .*)?$")
-NEAR = 0.01  # of the body's size: a node farther away is not the one that was meant
+NEAR = 0.01  # distance over the body's size, beyond which a node is not the one that was meant
 
 _REDUCE: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "max": lambda v: v.max(axis=1),
@@ -35,11 +35,6 @@ def find_columns(results: Results, source: str | Sequence[str]) -> list[Column]:
     """Return the columns that a name means: one, or all components of a vector.
 
     A name fits exactly, or in another case of its letters, or without its set (`` of TOP``), where only one does.
-
-    Raises
-    ------
-    UsageError
-        If there is none, or more than one.
     """
     if not isinstance(source, str):
         return [column for one in source for column in find_columns(results, one)]
@@ -102,10 +97,7 @@ def places_in_metres(results: Results, places: Places, mapping: ImportMapping) -
 def index_of_place(at: int | tuple[float, ...], ids: np.ndarray, points: np.ndarray, what: str) -> int:
     """Return the index of the place with a number, or nearest to a point.
 
-    Raises
-    ------
-    UsageError
-        If there is none: no such number, or the nearest place is farther away than a hundredth of the body.
+    A place farther away than a hundredth of the body is refused.
     """
     if isinstance(at, int):
         found = np.flatnonzero(ids == at)
@@ -136,23 +128,9 @@ def index_of_place(at: int | tuple[float, ...], ids: np.ndarray, points: np.ndar
 def chosen_columns(
     results: Results, entry: Input | Output, mapping: ImportMapping, wanted: str | None = None
 ) -> tuple[list[Column], str]:
-    """Return the columns of an input or output, reduced and in SI units, and their unit.
+    """Return the columns of an input or output of the mapping, reduced and in SI units, and their unit.
 
-    Parameters
-    ----------
-    results : Results
-        All that was read.
-    entry : Input or Output
-        Entry of the mapping.
-    mapping : ImportMapping
-        Gives the units.
-    wanted : str, optional
-        SI unit that the quantity must have; any by default.
-
-    Raises
-    ------
-    UsageError
-        If there is no such column, its unit is unknown or another, or the place is not there.
+    `wanted` is the SI unit that the quantity must have; any by default.
     """
     columns = find_columns(results, entry.columns)
     own_units = mapping.units if entry.unit is None else mapping.units | {c.name: entry.unit for c in columns}

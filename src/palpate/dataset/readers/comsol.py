@@ -134,13 +134,7 @@ def is_comsol(head: str) -> bool:
 
 
 def read_comsol(path: Path) -> Results:
-    """Read a text export of COMSOL Multiphysics.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is cut short or damaged, or of an unknown layout; the message names its line.
-    """
+    """Read a text export of COMSOL Multiphysics."""
     export = _take_apart(path, read_lines(path))
     sections = {
         m[1].lower() for block in export.blocks for _, text in block.comments if (m := _SECTION.match(text))

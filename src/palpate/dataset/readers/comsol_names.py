@@ -17,23 +17,12 @@ _ASSIGNMENT = re.compile(
 
 @dataclass(frozen=True)
 class Name:
-    """Name of a column.
+    """Name of a column."""
 
-    Attributes
-    ----------
-    text : str
-        Expression or description, without unit and solution.
-    unit : str or None
-        Unit in brackets; "" for an expression without one, None for a coordinate.
-    solution : str
-        What stands behind ``@``, "" where the column is of all solutions.
-    assignments : mapping of parameter to (value, unit)
-        Parameters that the solution names, with a unit or None.
-    """
-
-    text: str
-    unit: str | None
-    solution: str
+    text: str  # expression or description, without unit and solution
+    unit: str | None  # in brackets; "" for an expression without one, None for a coordinate
+    solution: str  # behind ``@``; "" where the column is of all solutions
+    # parameters that the solution names: each one's value, and its unit or None
     assignments: Mapping[str, tuple[float, str | None]] = field(default_factory=dict)
 
 
@@ -76,16 +65,10 @@ def split_cells(text: str, separator: str) -> list[str]:
 
 
 def split_names(text: str, separator: str, wanted: int) -> list[str]:
-    """Split a line of names; a name may hold commas in brackets, in quotes, and in the assignments behind ``@``.
+    """Split a line of names, without its ``%``.
 
-    Parameters
-    ----------
-    text : str
-        Line without its ``%``.
-    separator : str
-        Separator of the rows below, "" for blanks.
-    wanted : int
-        Number of values in the rows, by which the separator of the names is found.
+    A name may hold commas in brackets, in quotes, and in the assignments behind ``@``. `separator` is that of the rows
+    below, "" for blanks; where it is another one for the names, `wanted`, the number of values in a row, tells.
     """
     best: list[str] = []
     for mark in dict.fromkeys((separator, ",", ";", "\t", "")):

@@ -19,13 +19,7 @@ _MARKS = (
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a whole file.
-
-    Raises
-    ------
-    FileFormatError
-        If it is missing, empty, unreadable or larger than 4 GB.
-    """
+    """Read a whole file; one that is empty or larger than 4 GB is refused."""
     content = read_input(path)
     if not content.strip():
         raise refuse(path, None, "the file is empty.")

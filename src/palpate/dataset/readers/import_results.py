@@ -95,13 +95,7 @@ def import_results(
 
 
 def read_files(paths: Sequence[Path], mapping: ImportMapping) -> Results:
-    """Read files and join them as the mapping says; numbers in their names become columns.
-
-    Raises
-    ------
-    FileFormatError, UsageError
-        If a file can't be read, or they don't fit together.
-    """
+    """Read files and join them as the mapping says; numbers in their names become columns."""
     if not paths:
         raise UsageError("There are no files to import.", fix="Name at least one.")
     groups: dict[Any, list[Path]] = {}

@@ -16,17 +16,11 @@ from palpate.format import count
 __all__ = ["along_axes", "body_layout"]
 
 _REST = "surface"  # name of the triangles that belong to no surface of the mapping
-_SAME = 1e-6  # of the body's size: coordinates printed with six digits
+_SAME = 1e-6  # distance over the body's size that is rounding of coordinates printed with six digits
 
 
 def along_axes(results: Results, mapping: ImportMapping, values: np.ndarray) -> np.ndarray:
-    """Return the components (case, node, k) of a displacement along the chosen axes.
-
-    Raises
-    ------
-    UsageError
-        If it has neither a component for each chosen axis nor one for each axis of the file.
-    """
+    """Return the components (case, node, k) of a displacement along the chosen axes."""
     chosen, every = _axes(results, mapping)
     if values.shape[-1] == len(chosen):
         return values
@@ -64,21 +58,8 @@ def body_layout(
 ) -> tuple[Layout, np.ndarray, list[str]]:
     """Return the layout of a body, the indices of the nodes that are kept, and sentences about the others.
 
-    Parameters
-    ----------
-    results : Results
-        All that was read.
-    mapping : ImportMapping
-        Its axes, nodes, surfaces and loads.
-    nodes : str
-        Name of the nodes that fields belong to; empty where there are none: the body is then one point.
-    answers : mapping of name to (case, node, …) array
-        Fields at these nodes; a node without a number in any case is left out.
-
-    Raises
-    ------
-    UsageError
-        If nodes have no coordinates, or the mapping names nodes, axes or surfaces that are not there.
+    `nodes` names the nodes that fields belong to; empty where there are none: the body is then one point. `answers` are
+    the fields (case, node, …) at these nodes; a node without a number in any case is left out.
     """
     loads = [entry.load for entry in mapping.inputs if entry.load is not None]
     if not nodes:

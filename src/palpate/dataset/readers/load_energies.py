@@ -17,7 +17,7 @@ from palpate.units import Range
 __all__ = ["with_energies"]
 
 FEWEST = 4  # solves for a cubic spline
-_CONTRADICTION = 1e-3  # of the largest energy; integrals over ten loads are ten times as good
+_CONTRADICTION = 1e-3  # share of the largest energy; integrals over ten loads are ten times as good
 
 
 def with_energies(
@@ -28,25 +28,11 @@ def with_energies(
     layout: Layout,
     weight: bool,
 ) -> tuple[list[Field], dict[str, np.ndarray], list[str]]:
-    """Add the potential and the strain energy where they follow from the other answers.
+    """Add the potential and the strain energy where they follow from the other answers, with sentences about them.
 
-    Parameters
-    ----------
-    fields, answers : Field and arrays
-        What the import has of each case.
-    inputs : (case, n) array
-        Loads, N.
-    ranges : n ranges
-        Ranges of the loads.
-    layout : Layout
-        Nodes and directions of the loads.
-    weight : bool
-        True where gravity acts too: the body moves without a load then, and no energy follows.
-
-    Returns
-    -------
-    fields, answers, notes
-        The same with the energies, and sentences about them.
+    `fields` and `answers` are what the import has of each case, `inputs` (case, n) the loads in N, and the layout tells
+    their nodes and directions. `weight` is True where gravity acts too: the body moves without a load then, and no
+    energy follows.
     """
     notes: list[str] = []
     fields, answers = list(fields), dict(answers)

@@ -18,11 +18,6 @@ def by_case_and_place(results: Results, mapping: ImportMapping) -> Results:
     """Return results by case and place where the mapping's coordinates are columns with one number a row.
 
     Rows of equal inputs are one case; every case must have the same places.
-
-    Raises
-    ------
-    UsageError
-        If cases have different places, or one place twice.
     """
     axes = mapping.coordinates or ()
     nodal = any(places.coordinates for places in results.places.values())

@@ -40,28 +40,23 @@ Place = Count | tuple[Metres, ...]
 
 
 class Load(Record):
-    """A force on one node.
+    """A force on one node."""
 
-    Attributes
-    ----------
-    at : int or coordinates
-        Number of the node in the file, or its place at rest, m.
-    direction : tuple of float
-        Direction of a positive load, of any length.
-    """
-
-    at: Place
-    direction: tuple[Number, ...]
+    at: Place  # number of the node in the file, or its place at rest, m
+    direction: tuple[Number, ...]  # of a positive load, of any length
 
 
 class _Source(Record):
     model_config = ConfigDict(populate_by_name=True)
 
     name: str
+    # column in the file; by default the one of its name
     source: str | tuple[str, ...] = Field(default="", alias="from")
-    unit: str | None = None
+    unit: str | None = None  # of the column, where the file states none or a wrong one
+    # a factor, such as -1, after all else; as a quantity, "5 N", the column is a load factor without a unit
     times: float | str = 1.0
-    at: Place | None = None
+    at: Place | None = None  # place of the column whose values are meant
+    # how one number is made of all places of the column
     reduce: Literal["max", "min", "mean", "sum"] | None = None
 
     @property
@@ -71,63 +66,27 @@ class _Source(Record):
 
 
 class Input(_Source):
-    """One input of the dataset.
+    """One input of the dataset."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the input.
-    source : str
-        Column that it comes from, in the file ``from``; by default the one of its name.
-    unit : str, optional
-        Unit of the column, where the file states none or a wrong one.
-    times : float or str
-        Factor, such as -1, after all else; as a quantity, ``"5 N"``, the column is a load factor without a unit.
-    at : int or coordinates, optional
-        Place of the column whose values are meant.
-    reduce : {"max", "min", "mean", "sum"}, optional
-        How one number is made of all places of the column.
-    load : Load, optional
-        Node and direction where the input is a force on a node.
-    range : pair of float or str, optional
-        Ends of the range in SI units, or as text with a unit; by default the least and the largest value.
-    """
-
-    load: Load | None = None
+    load: Load | None = None  # node and direction where the input is a force on a node
+    # ends in SI units or as text with a unit; by default the least and the largest value
     range: tuple[float | str, float | str] | None = None
 
 
 class Output(_Source):
-    """One quantity that each case answers; the keys of an `Input` and these.
+    """One quantity that each case answers; the keys of an `Input` and these."""
 
-    Attributes
-    ----------
-    invariant : {"von Mises"}, optional
-        Number that is made of the six components of a tensor.
-    meaning : str
-        A few words that are kept beside the numbers.
-    """
-
-    invariant: Literal["von Mises"] | None = None
-    meaning: str = ""
+    invariant: Literal["von Mises"] | None = None  # made of the six components of a tensor
+    meaning: str = ""  # a few words that are kept beside the numbers
 
 
 class Nodes(Record):
-    """Nodes that are kept.
+    """Nodes that are kept."""
 
-    Attributes
-    ----------
-    near : mapping of axis to m
-        Coordinates that a kept node has, by the name of the axis in the file.
-    tolerance : float
-        Largest distance from them, m; a millionth of the body's size by default.
-    sort : str
-        Axis along which the nodes are ordered.
-    """
-
+    # coordinates that a kept node has, by the name of the axis in the file
     near: dict[str, Metres] = Field(default_factory=dict)
-    tolerance: Metres | None = None
-    sort: str | None = None
+    tolerance: Metres | None = None  # largest distance from them; by default a millionth of the body's size
+    sort: str | None = None  # axis along which the nodes are ordered
 
 
 class ImportMapping(Record):

@@ -20,13 +20,8 @@ SYSTEM = ("length", "force", "time")
 def unit_of(column: Column, units: Mapping[str, str]) -> str | None:
     """Return the unit of a column; None where neither the file nor the mapping says it.
 
-    Parameters
-    ----------
-    column : Column
-        Its name, the unit in the file and the formula of its unit in a consistent system.
-    units : mapping
-        Units by the name of a column, which go before the file's; and the three of a consistent system, ``length``,
-        ``force`` and ``time``, which hold for what has no unit of its own.
+    The mapping's `units` by the name of a column go before the file's; the three of a consistent system, ``length``,
+    ``force`` and ``time``, hold for what has no unit of its own.
     """
     if column.name in units:
         return units[column.name]
@@ -41,21 +36,9 @@ def unit_of(column: Column, units: Mapping[str, str]) -> str | None:
 def values_in_si(
     column: Column, units: Mapping[str, str], wanted: str | None = None
 ) -> tuple[np.ndarray, str]:
-    """Return the values of a column in SI units, and the unit.
+    """Return the values of a column in SI units, and the unit; see `unit_of`.
 
-    Parameters
-    ----------
-    column : Column
-        Values as they stand in the file.
-    units : mapping
-        Units of the mapping, see `unit_of`.
-    wanted : str, optional
-        SI unit that the quantity must have; any by default.
-
-    Raises
-    ------
-    UsageError
-        If no unit is stated, it is unknown, or of another quantity than `wanted`.
+    `wanted` is the SI unit that the quantity must have; any by default.
     """
     unit = unit_of(column, units)
     if unit is None:

@@ -20,8 +20,8 @@ __all__ = ["TIME", "Column", "Places", "Results", "join_cases", "join_columns", 
 TIME = "time"
 """Name of the column with the time or the load factor of each case, where a format has one."""
 
-SAME_PLACE = 1e-6  # of the body's size: coordinates printed with six digits
-SAME_TIME = 1e-5  # relative: times printed with six digits
+SAME_PLACE = 1e-6  # distance over the body's size that is rounding of coordinates printed with six digits
+SAME_TIME = 1e-5  # relative difference that is rounding of times printed with six digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,11 +180,6 @@ def join_columns(parts: Sequence[Results]) -> Results:
     """Join files of the same cases: the columns of all, and only the cases that all have.
 
     Cases are matched by their times where every file has them, otherwise by their order.
-
-    Raises
-    ------
-    UsageError
-        If the numbers of cases differ and there are no times to match them by.
     """
     if len(parts) == 1:
         return parts[0]
@@ -268,11 +263,6 @@ def join_cases(parts: Sequence[Results]) -> Results:
     """Put the cases of several files, all of one model, one after the other.
 
     Columns that not all files have are left out and named.
-
-    Raises
-    ------
-    UsageError
-        If the places differ, or one column has different units.
     """
     if len(parts) == 1:
         return parts[0]

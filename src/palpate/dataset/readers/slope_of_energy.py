@@ -18,16 +18,16 @@ from palpate.units import Range
 
 __all__ = ["contradiction"]
 
-_NEIGHBOURS = 8  # of a case, in the scale of the ranges
+_NEIGHBOURS = 8  # neighbours of a case, in the scale of the ranges
 _MOST = 20_000  # pairs, which are enough to tell a factor
 _SILENT = 10.0  # weight of an input without a response
 _EVEN = 0.1  # least ratio of the responses at the ends of a pair
 _FAR = 200  # cases whose pairs are all taken, where near ones say nothing
 _PER_INPUT = 10  # cases for each input, with which a contradiction without a factor is told
 _FEWEST = 6  # pairs that say something, and three of them for each input
-_SURE = 0.6  # share of the energy's differences that a factor has to explain, to be told
-_TELLING = 0.9  # the same, for the signs of single inputs
-_EQUAL = 1.6  # factor up to which both are the same: pairs far apart, and curved responses
+_SURE = 0.6  # share of the energy's differences that a factor has to explain, to be believed
+_TELLING = 0.9  # share that the signs of single inputs have to explain, to be believed
+_EQUAL = 1.6  # ratio up to which two factors are the same: pairs far apart, and curved responses
 
 _TIMES = {3: "a thousand times", -3: "a thousandth of", 6: "a million times", -6: "a millionth of"}
 _CAUSES = {
@@ -49,16 +49,7 @@ def contradiction(
 ) -> list[str]:
     """Return a warning where responses (case, n) and energies contradict each other, or a note where nobody can tell.
 
-    Parameters
-    ----------
-    fields, answers : Field and arrays
-        What the import has of each case.
-    inputs : (case, n) array
-        Inputs in SI units.
-    ranges : n ranges
-        Their ranges.
-    extent : float
-        Largest length of the body in m, for the likely cause.
+    `inputs` (case, n) are in SI units; `extent`, the largest length of the body in m, serves the likely cause.
     """
     name = next((n for n in ("potential_energy", "strain_energy") if n in answers), "")
     has_response = any(f.name == "response" and f.dims == ("input",) for f in fields)

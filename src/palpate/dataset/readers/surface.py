@@ -28,12 +28,8 @@ def outer_surface(cells: Iterable[tuple[str, np.ndarray]], points: np.ndarray) -
 
     Where solid cells exist, surface cells among them are passed over: they lie on faces of the solids.
 
-    Parameters
-    ----------
-    cells : iterable of (kind, (e, k) array of int)
-        Nodes of each cell; beyond the corners they are ignored. Kinds that have no faces, such as lines, are too.
-    points : (n, 2) or (n, 3) array
-        Coordinates of the nodes, by which solids numbered the other way round are turned.
+    Each cell has a kind and its nodes (e, k), of which those beyond the corners are ignored; kinds that have no faces,
+    such as lines, are too. By the coordinates (n, 2) or (n, 3) solids numbered the other way round are turned.
     """
     blocks = [(kind, nodes) for kind, nodes in cells if kind in _FACES and len(nodes)]
     solid = any(kind in _SOLIDS for kind, _ in blocks)

@@ -15,13 +15,7 @@ SUFFIXES = (".csv", ".tsv", ".txt", ".asc", ".lvm", ".xlsx")
 
 
 def read_text_table(path: Path) -> Results:
-    """Read the columns of numbers of a table; columns of words are skipped and named.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is no table, is ambiguous, or a cell among numbers holds none; the message names its line.
-    """
+    """Read the columns of numbers of a table; columns of words are skipped and named."""
     table = read_table(path)
     columns, notes = [], list(table.notes)
     for column in table.columns:

@@ -65,13 +65,6 @@ def read_vtk(path: Path) -> Results:
     """Read a file of the VTK family; of a ``.pvd`` each step is a case.
 
     Columns are called as the array, of a vector ``NAME.x``, of a symmetric tensor ``NAME.xx``.
-
-    Raises
-    ------
-    FileFormatError
-        If the file or one that it names is missing or damaged, or nodes move or change from step to step.
-    UsageError
-        If the format needs PyVista, and it isn't installed.
     """
     if path.suffix.lower() != ".pvd":
         return _collect(path, [_read(path)], None)
@@ -109,13 +102,7 @@ def _time(path: Path, text: str) -> float:
 
 
 def read_series(path: Path) -> list[tuple[str, Path]]:
-    """Return the time steps, as they stand there, and the files of a ``.pvd`` collection.
-
-    Raises
-    ------
-    FileFormatError
-        If it can't be read, names no files, or has several parts for one time.
-    """
+    """Return the time steps, as they stand there, and the files of a ``.pvd`` collection."""
     try:
         rows = ElementTree.fromstring(read_input(path, largest=_LARGEST_SERIES)).findall("Collection/DataSet")
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
@@ -148,13 +135,7 @@ def _read(path: Path) -> Grid:
 
 
 def read_vtu(path: Path) -> Grid:
-    """Read a ``.vtu`` file of a usual coding, by meshio.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is missing, damaged, or of a coding that meshio does not know.
-    """
+    """Read a ``.vtu`` file of a usual coding, by meshio."""
     return read_in_child(_read_with_meshio, path)
 
 

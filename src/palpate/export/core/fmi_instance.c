@@ -17,7 +17,11 @@ __declspec(dllimport) int __stdcall MultiByteToWideChar(unsigned int, unsigned l
 #define FMI
 #endif
 
-enum { OK = 0, WARNING = 1, DISCARD = 2, ERROR = 3 }; /* of fmi2Status and fmi3Status */
+/* of fmi2Status and fmi3Status: numbers, which C turns into either */
+#define OK 0
+#define WARNING 1
+#define DISCARD 2
+#define ERROR 3
 enum { INSTANTIATED = 1, INITIALIZING = 2, EVENT = 4, CONTINUOUS = 8, STEPPING = 16, TERMINATED = 32 };
 #define RUNNING (EVENT | CONTINUOUS | STEPPING)
 #define ANY 63

@@ -28,32 +28,18 @@ _LARGEST = 1e100  # its square is still a number
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Checked samples.
+    """Checked samples."""
 
-    Attributes
-    ----------
-    X, Y : (N, n), (N, m)
-        Inputs and outputs of N samples, SI units.
-    inputs, outputs : n ranges, m quantities
-        Names, units and ranges of the columns of X, names and units of those of Y.
-    one_output : bool
-        Whether Y came as (N,).
-    columns : tuple of str
-        Names of the table's columns that are the inputs, in their order; of a bare array those of the inputs.
-    lines : tuple of int, optional
-        Line of each row of the table, by which notes name a sample; None where they count the rows from 0.
-    rows : tuple of int, optional
-        Row of the table of each sample, where some rows are left out.
-    """
-
-    X: np.ndarray
-    Y: np.ndarray
+    X: np.ndarray  # (N, n), SI units
+    Y: np.ndarray  # (N, m), SI units
     inputs: tuple[Range, ...]
     outputs: tuple[Quantity, ...]
-    one_output: bool
+    one_output: bool  # Y came as (N,)
+    # of the table that are the inputs, in their order; of a bare array names of the inputs
     columns: tuple[str, ...]
+    # of each row in the table, by which notes name a sample; None where they count rows from 0
     lines: tuple[int, ...] | None = None
-    rows: tuple[int, ...] | None = None
+    rows: tuple[int, ...] | None = None  # of the table, one for each sample, where some rows are left out
 
     @classmethod
     def of(
@@ -64,13 +50,7 @@ class Samples:
         outputs: Sequence[Quantity] | None = None,
         lines: Sequence[int] | None = None,
     ) -> Samples:
-        """Check what a user has; see `palpate.fit`.
-
-        Raises
-        ------
-        UsageError
-            If they are no samples to learn from.
-        """
+        """Check what a user has; see `palpate.fit`."""
         X, columns = _numbers_and_names("Inputs X", X, inputs)
         Y, names = _numbers_and_names("Outputs Y", Y, outputs)
         one = Y.ndim == 1
@@ -90,43 +70,23 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class ArrayProblem:
-    """The samples to learn from, in scaled inputs and latent outputs.
-
-    Attributes
-    ----------
-    inputs, outputs : tuples of n ranges and m quantities
-        As the samples declare them.
-    X : (N, n)
-        Scaled to [−1, 1] over the declared ranges.
-    Y : (N, k)
-        Latent outputs: scaled outputs are Y @ basis, but for 1e-8 of them or what is beyond 96 modes.
-    basis : (k, m)
-        Orthonormal.
-    scaling : Scaling
-        Outputs by the standard deviation of all of one unit together.
-    record : mapping
-        Of the samples in SI units, for the network's `meta`.
-    """
+    """The samples to learn from, in scaled inputs and latent outputs."""
 
     inputs: tuple[Range, ...]
     outputs: tuple[Quantity, ...]
-    X: np.ndarray
+    X: np.ndarray  # (N, n), scaled to [−1, 1] over the declared ranges
+    # (N, k), latent outputs: scaled ones are Y @ basis, but for 1e-8 of them or what is beyond 96 modes
     Y: np.ndarray
-    basis: np.ndarray
-    scaling: Scaling
+    basis: np.ndarray  # (k, m), orthonormal
+    scaling: Scaling  # outputs by the standard deviation of all of one unit together
+    # of the samples in SI units, for the network's `meta`
     record: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(
         cls, X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range], outputs: Sequence[Quantity]
     ) -> ArrayProblem:
-        """Scale X (N, n) and Y (N, m), which are in SI units.
-
-        Raises
-        ------
-        UsageError
-            If there are fewer than 20 samples, shapes disagree or numbers are not finite.
-        """
+        """Scale X (N, n) and Y (N, m), which are in SI units; 20 samples at least."""
         X, Y, _, _, _ = samples(X, Y, inputs=len(inputs), outputs=len(outputs), fewest=FEWEST)
         spread = spread_of(Y)
         constant = not np.ptp(Y, axis=0).any() or spread <= 1e-13 * float(np.abs(Y).max())
@@ -176,19 +136,7 @@ def _scales(Y: np.ndarray, outputs: Sequence[Quantity]) -> float | np.ndarray:
 def points(X: Any, inputs: Sequence[Range], columns: Sequence[str] = ()) -> np.ndarray:
     """Return inputs (N, n) at which something is asked; of a single input (N,) will do.
 
-    Parameters
-    ----------
-    X : array-like or table
-        The inputs; a table's columns are matched by name and may stand in any order.
-    inputs : sequence of n ranges
-        What the network takes.
-    columns : sequence of str
-        Names of the columns in a table; by default those of the inputs.
-
-    Raises
-    ------
-    UsageError
-        If it is no such array, or a table that lacks a column or has an unknown one.
+    A table's columns may stand in any order; their names are `columns`, by default those of the inputs.
     """
     n = len(inputs)
     asked = columns_in_order("Inputs X", X, columns or [r.name for r in inputs])
@@ -209,13 +157,7 @@ def constant(Y: np.ndarray) -> bool:
 
 
 def check_search(seed: Any, target: Any, level: Any) -> None:
-    """Refuse what can't steer a search.
-
-    Raises
-    ------
-    UsageError
-        If the target is not positive, the seed is no whole number, or the level no probability.
-    """
+    """Refuse a target that is not positive, a seed that is no whole number, and a level that is no probability."""
     if target is not None:
         check_target(target)
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:

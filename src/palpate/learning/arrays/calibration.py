@@ -65,18 +65,10 @@ _ROUND_OFF = 1e-24  # mean square of scaled outputs
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The errors of a network on samples that its weights had not seen.
+    """The errors of a network on samples that its weights had not seen."""
 
-    Attributes
-    ----------
-    missed : (N', m)
-        In scaled outputs.
-    spread : (N',)
-        σ² over s² at these samples, of that network.
-    """
-
-    missed: np.ndarray
-    spread: np.ndarray
+    missed: np.ndarray  # (N', m), in scaled outputs
+    spread: np.ndarray  # (N',), σ² over s² at these samples, of that network
 
     @classmethod
     def together(cls, parts: Sequence[Evidence], gain: float = 1.0) -> Evidence:
@@ -153,16 +145,8 @@ def calibrated(
 ) -> Uncertainty:
     """Return the network's uncertainty, its widths set so that intervals of `level` hold what the evidence holds.
 
-    Parameters
-    ----------
-    network : Network
-        The network whose intervals are wanted.
-    M : (c, c), optional
-        Covariance of tail and weights over s²; none where widths are to be the same everywhere.
-    evidence : sequence of Evidence
-        Of m outputs; where there are several, the widest counts, output by output.
-    level : float
-        Share of unseen samples that an interval is to hold, between 0 and 1.
+    M (c, c) is the covariance of tail and weights over s², None where widths are to be the same everywhere. Of several
+    pieces of evidence of the m outputs the widest counts, output by output.
     """
     pairs = [_noise_and_factor(one, level, constant=M is None) for one in evidence]
     noise, factor = np.array([n for n, _ in pairs]), np.array([f for _, f in pairs])

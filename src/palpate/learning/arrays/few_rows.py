@@ -60,33 +60,16 @@ def few_places(places: np.ndarray) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """A layer of all rows, and what layers like it miss of rows that they had not seen.
+    """A layer of all rows, and what layers like it miss of rows that they had not seen."""
 
-    Attributes
-    ----------
-    form : str
-        "kernel layer", "affine" or "mean".
-    layer : KernelLayer
-        Its units may be none.
-    missed : (N, k)
-        Of every row, in latent outputs.
-    spread : (N,)
-        Variance over s² that such a layer says of the row.
-    influence : (1 + n + h, P)
-        By which the coefficients follow from the outputs of P places.
-    covariance : (c, c), optional
-        M with which the variance of the layer is s² (1 + φ̃ᵀ M φ̃); none where it is the same everywhere.
-    means : (P, N)
-        By which the means at the places follow from the rows.
-    """
-
-    form: str
-    layer: KernelLayer
-    missed: np.ndarray
-    spread: np.ndarray
-    influence: np.ndarray
+    form: str  # "kernel layer", "affine" or "mean"
+    layer: KernelLayer  # its units may be none
+    missed: np.ndarray  # (N, k), of every row, in latent outputs
+    spread: np.ndarray  # (N,), variance over s² that such a layer says of the row
+    influence: np.ndarray  # (1 + n + h, P), by which the coefficients follow from the outputs of P places
+    # M (c, c) of the layer's variance s² (1 + φ̃ᵀ M φ̃); None where it is the same everywhere
     covariance: np.ndarray | None
-    means: np.ndarray
+    means: np.ndarray  # (P, N), by which the means at the places follow from the rows
 
     @cached_property
     def error(self) -> float:
@@ -119,20 +102,9 @@ def best_of_few(
 ) -> LeftOut:
     """Return the mean, the plane or the process that misses least of places left out.
 
-    Parameters
-    ----------
-    X, Y : (N, n) and (N, k)
-        Scaled inputs and latent outputs.
-    places : (N,)
-        Rows of one place are left out together.
-    target : float
-        Error per latent output that is good enough for a plane.
-    budget : Budget
-        Its limit on time ends the search for other kinds of processes.
-    trials : list of Trial
-        Records are added to it.
-    unit : float
-        Error per latent output that is one standard deviation.
+    X (N, n) are scaled inputs, Y (N, k) latent outputs. Rows of one of the `places` (N,) are left out together.
+    `target` is the error per latent output that is good enough for a plane, `unit` that which is one standard
+    deviation; records are added to `trials`.
     """
     search = _Search(X, Y, places, budget)
     tried = [search.left_out_tail("mean"), search.left_out_tail("affine")]

@@ -36,18 +36,10 @@ def notes_on(
     rows: np.ndarray,
     scales: np.ndarray,
 ) -> tuple[str, ...]:
-    """Return what a user must be told, a sentence or two each.
+    """Return what a user must be told, a sentence or two each, of what was learnt.
 
-    Parameters
-    ----------
-    samples, problem : Samples, ArrayProblem
-        What was learnt from.
-    fitted : Fitted
-        What was learnt; its `heldout` counts.
-    missed, rows : (J, m) and (J,)
-        Errors at unseen samples in scaled outputs, and which samples these are.
-    scales : (n,)
-        By how much each scaled input matters, as the likelihood of a kernel says.
+    `missed` (J, m) are errors at unseen samples in scaled outputs, `rows` (J,) which samples these are, and `scales`
+    (n,) by how much each scaled input matters, as the likelihood of a kernel says.
     """
     notes = []
     if fitted.heldout > _NO_BETTER:

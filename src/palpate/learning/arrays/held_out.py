@@ -31,25 +31,12 @@ _STEEPER: dict[RadialFunction, float] = {"gaussian": 0.48, "matern-5/2": 0.6, "i
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Samples to learn from and to be judged by, scaled.
+    """Samples to learn from and to be judged by, scaled."""
 
-    Attributes
-    ----------
-    X, Y : (N, n) and (N, k) arrays
-        To learn from, in a random order.
-    unseen : (N', n) and (N', k) arrays
-        To be judged by.
-    held : (N + N',) bool array
-        Which of all samples those are.
-    partial : bool
-        True where only a part of the samples that may be learnt from is there. A candidate then keeps the best error
-        that it had: what was best on few samples is a start on all of them, not a rival.
-    """
-
-    X: np.ndarray
-    Y: np.ndarray
-    unseen: tuple[np.ndarray, np.ndarray]
-    held: np.ndarray
+    X: np.ndarray  # (N, n), to learn from, in a random order
+    Y: np.ndarray  # (N, k)
+    unseen: tuple[np.ndarray, np.ndarray]  # (N', n) and (N', k), to be judged by
+    held: np.ndarray  # (N + N',), which of all samples those are
     partial: bool = False
 
     @classmethod
@@ -76,7 +63,11 @@ class HeldOut:
         return cls(X[kept], Y[kept], (X[held], Y[held]), held)
 
     def first(self, count: int) -> HeldOut:
-        """Return the same with `count` samples to learn from at most."""
+        """Return the same with `count` samples to learn from at most, `partial`.
+
+        A candidate then keeps the best error that it had: what was best on few samples is a start on all of them, not a
+        rival.
+        """
         return replace(self, X=self.X[:count], Y=self.Y[:count], partial=True)
 
     def evaluate(self, candidate: Candidate, iterations: int, seconds: float | None = None) -> Candidate:

@@ -27,18 +27,10 @@ _INFLUENCE, _MISSED = "left_out_influence", "left_out_missed"
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """The share of each sample in the answers of a network, and what was missed of it.
+    """The share of each sample in the answers of a network, and what was missed of it."""
 
-    Attributes
-    ----------
-    coefficients : (1 + n + h, P)
-        G of the network's tail and units.
-    missed : (P, m)
-        What was missed of each sample by networks that had not seen it, in scaled outputs.
-    """
-
-    coefficients: np.ndarray
-    missed: np.ndarray
+    coefficients: np.ndarray  # (1 + n + h, P), G of the network's tail and units
+    missed: np.ndarray  # (P, m), of each sample by networks that had not seen it, in scaled outputs
 
     def deviation(self, network: Network, X: np.ndarray) -> np.ndarray:
         """Return the jackknife's standard deviation (N, m) of a network's answers at X (N, n), in SI units."""

@@ -66,38 +66,20 @@ _END = 6.0  # passes over all rows that the end takes at most
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """The kind of network that was chosen on the subset.
+    """The kind of network that was chosen on the subset."""
 
-    Attributes
-    ----------
-    units : Candidate
-        The best network's kind and units; without units an affine function suffices.
-    metric : Metric or None
-        Of the best kernel layer.
-    mark : float
-        Its error on held-out rows of the subset, per latent output.
-    """
-
-    units: Candidate
-    metric: Metric | None = None
-    mark: float = math.inf
+    units: Candidate  # the best network's kind and units; without units an affine function suffices
+    metric: Metric | None = None  # of the best kernel layer
+    mark: float = math.inf  # its error on held-out rows of the subset, per latent output
 
 
 @dataclass(frozen=True, eq=False)
 class RowParts:
-    """The rows to learn from, to decide by, and to measure the error by.
+    """The rows to learn from, to decide by, and to measure the error by."""
 
-    Attributes
-    ----------
-    learn : (L,) int
-        Rows to learn from, in a random order.
-    decide, judge : (N,) bool
-        Masks of the rows by which is decided, and by which the error is measured.
-    """
-
-    learn: np.ndarray
-    decide: np.ndarray
-    judge: np.ndarray
+    learn: np.ndarray  # (L,) indices, in a random order
+    decide: np.ndarray  # (N,) mask
+    judge: np.ndarray  # (N,) mask
 
     @classmethod
     def of(cls, places: np.ndarray, seed: int) -> RowParts:
@@ -117,26 +99,10 @@ class RowParts:
 
 
 class ManyRows:
-    """The fit to all rows of a problem.
+    """The fit to all rows of a scaled problem, with the work that is left after the structure was chosen.
 
-    Parameters
-    ----------
-    problem : ArrayProblem
-        All rows, scaled.
-    parts : RowParts
-        Which are learnt from.
-    work : Work
-        The work that is left after the structure was chosen.
-    seed : int
-        Decides where new units start.
-    target : float
-        Error per latent output that is good enough.
-    workers : int
-        Threads that add up rows.
-    deadline : float
-        Of `time.monotonic`; infinite without a limit on time.
-    trials : list of Trial
-        Where records of what was tried are added.
+    The seed decides where new units start, `target` is an error per latent output that is good enough, `workers` are
+    threads that add up rows, and `trials` takes records of what was tried.
     """
 
     def __init__(

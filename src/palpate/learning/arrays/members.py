@@ -41,25 +41,13 @@ _RIDGES = tuple(10.0**k for k in range(-13, -2))
 
 @dataclass(frozen=True, eq=False)
 class Crossed:
-    """Networks of one kind, each with weights from the samples that it may know, in scaled inputs and latent outputs.
+    """Networks of one kind, each with weights from the samples that it may know, scaled inputs and latent outputs."""
 
-    Attributes
-    ----------
-    networks : tuple of K Refined
-        Members of the mean.
-    unseen : (K, N) bool array
-        Samples that each one has not seen, neither its units nor its weights.
-    rounds : (K,) int array
-        The round of each network; in one round a sample is unseen by one network at most.
-    X, Y : (N, n) and (N, k) arrays
-        All samples.
-    """
-
-    networks: tuple[Refined, ...]
-    unseen: np.ndarray
-    rounds: np.ndarray
-    X: np.ndarray
-    Y: np.ndarray
+    networks: tuple[Refined, ...]  # K members of the mean
+    unseen: np.ndarray  # (K, N), samples that neither units nor weights of each one have seen
+    rounds: np.ndarray  # (K,), in one round a sample is unseen by one network at most
+    X: np.ndarray  # (N, n)
+    Y: np.ndarray  # (N, k)
 
     @cached_property
     def _answers(self) -> np.ndarray:
@@ -103,10 +91,7 @@ class Crossed:
     def spread(self, spread_of: Callable[[Refined, np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
         """Return at the tested samples (J,) the mean spread of the networks that had not seen them.
 
-        Parameters
-        ----------
-        spread_of : callable
-            Spread (M,) of a network at inputs (M, n), of the mask (N,) of the samples that it had not seen.
+        `spread_of` takes a network, the mask (N,) of the samples that it had not seen, and inputs (M, n).
         """
         total, count = np.zeros(len(self.X)), np.zeros(len(self.X))
         for network, unseen in zip(self.networks, self.unseen, strict=True):
@@ -161,22 +146,13 @@ def refit_weights(network: Refined, X: np.ndarray, Y: np.ndarray, ridge: float =
 
 @dataclass(frozen=True, eq=False)
 class CrossedLayers:
-    """A kernel layer of all samples, and layers of its metric that had not seen some of them.
+    """A kernel layer of all samples, and layers of its metric that had not seen some of them."""
 
-    Attributes
-    ----------
-    layer : KernelLayer
-        The one that is handed over.
-    folds : tuple of (KernelLayer, mask)
-        Each layer with the samples (N,) that it had not seen; no sample is in two.
-    X, Y : (N, n) and (N, k) arrays
-        All samples, scaled inputs and latent outputs.
-    """
-
-    layer: KernelLayer
+    layer: KernelLayer  # the one that is handed over
+    # each with the mask (N,) of what it had not seen; no sample is in two
     folds: tuple[tuple[KernelLayer, np.ndarray], ...]
-    X: np.ndarray
-    Y: np.ndarray
+    X: np.ndarray  # (N, n), scaled inputs
+    Y: np.ndarray  # (N, k), latent outputs
 
     @classmethod
     def of(
@@ -224,21 +200,11 @@ def clearly_less(missed: np.ndarray, other: np.ndarray, *, errors: float = 1.0) 
 
 @dataclass(frozen=True, eq=False)
 class Fresh:
-    """The recipe of another network like one that was found, from another start.
+    """The recipe of another network like one that was found, from another start."""
 
-    Attributes
-    ----------
-    like : Candidate
-        The network that was found: its kind and its number of units are taken.
-    scales : (n,) array
-        Of first units.
-    deadline : float
-        Of `time.monotonic`.
-    """
-
-    like: Candidate
-    scales: np.ndarray
-    deadline: float
+    like: Candidate  # whose kind and number of units are taken
+    scales: np.ndarray  # (n,), of first units
+    deadline: float  # of `time.monotonic`
 
     def refined(self, where: tuple[HeldOut, int]) -> Candidate | None:
         """Return the network refined on a split from a start of a seed; nothing where the time does not suffice."""

@@ -59,17 +59,8 @@ class OutOfTime(Exception):
 class RegressorRows:
     """Regressors [1, x, φ] of units that stay as they are, compiled as the runtime has them.
 
-    Parameters
-    ----------
-    factors, shifts : (h, r, n) and (h, r)
-        A and b of each unit, in scaled inputs.
-    radial : RadialFunction
-        The radial function.
-
-    Attributes
-    ----------
-    tail, units, columns : int
-        Number of the tail's columns, of the units, and of both.
+    Units have factors A (h, r, n) and shifts b (h, r) in scaled inputs; `columns` counts those of the tail and the
+    units.
     """
 
     def __init__(self, factors: np.ndarray, shifts: np.ndarray, radial: RadialFunction) -> None:
@@ -95,23 +86,11 @@ class RegressorRows:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """The sums that decide the weights.
+    """The sums that decide the weights."""
 
-    Attributes
-    ----------
-    gram : (c, c)
-        ΦᵀΦ.
-    cross : (c, k)
-        ΦᵀY.
-    square : float
-        Sum of the squares of Y.
-    rows : int
-        Number of rows added up.
-    """
-
-    gram: np.ndarray
-    cross: np.ndarray
-    square: float
+    gram: np.ndarray  # (c, c), ΦᵀΦ
+    cross: np.ndarray  # (c, k), ΦᵀY
+    square: float  # sum of the squares of Y
     rows: int
 
     def __add__(self, other: Moments) -> Moments:
@@ -125,12 +104,7 @@ class Moments:
     def factor(self, ridge: float, tail: int) -> tuple[np.ndarray, bool]:
         """Return the Cholesky factor of the Gram matrix with its ridge, which grows where rounding asks for it.
 
-        Parameters
-        ----------
-        ridge : float
-            λ, relative to the number of rows.
-        tail : int
-            Number of leading columns that have no ridge.
+        The ridge λ is relative to the number of rows; the `tail` leading columns have none.
         """
         c, penalty = len(self.gram), np.full(len(self.gram), ridge * self.rows)
         penalty[:tail] = _TAIL_RIDGE * self.rows
@@ -152,35 +126,19 @@ class Moments:
 
 @dataclass(frozen=True, eq=False)
 class RowStream:
-    """Rows of samples that are looked at block by block.
+    """Rows of samples, scaled inputs and latent outputs, that are looked at block by block."""
 
-    Attributes
-    ----------
-    X, Y : (N, n) and (N, k) arrays
-        Scaled inputs and latent outputs.
-    workers : int
-        Threads; results are the same with any number.
-    deadline : float
-        Of `time.monotonic`; infinite without a limit on time.
-    """
-
-    X: np.ndarray
-    Y: np.ndarray
-    workers: int = 1
-    deadline: float = math.inf
+    X: np.ndarray  # (N, n)
+    Y: np.ndarray  # (N, k)
+    workers: int = 1  # threads; results are the same with any number
+    deadline: float = math.inf  # of `time.monotonic`; past it `OutOfTime` is raised
 
     def first(self, count: int) -> RowStream:
         """Return the first rows alone."""
         return self if count >= len(self.X) else replace(self, X=self.X[:count], Y=self.Y[:count])
 
     def moments(self, regressors: RegressorRows) -> Moments:
-        """Return the sums for regressors.
-
-        Raises
-        ------
-        OutOfTime
-            If the limit on time passes.
-        """
+        """Return the sums for regressors."""
 
         def of_block(X: np.ndarray, Y: np.ndarray) -> list[np.ndarray]:
             rows = regressors(X)
@@ -192,13 +150,7 @@ class RowStream:
     def sums(
         self, of_block: Callable[[np.ndarray, np.ndarray], list[np.ndarray]], width: int
     ) -> list[np.ndarray]:
-        """Return the arrays that a function makes of each block, added up in double precision.
-
-        Raises
-        ------
-        OutOfTime
-            If the limit on time passes.
-        """
+        """Return the arrays that a function makes of each block, added up in double precision."""
         total: list[np.ndarray] = []
         for parts in self._blocks(of_block, max(1, min(_MOST_ROWS, _BLOCK // max(width, 1)))):
             if not total:
@@ -234,18 +186,8 @@ def solve_weights(
 ) -> np.ndarray:
     """Return the coefficients (c, k) of least squares with a ridge on the units' weights.
 
-    Parameters
-    ----------
-    stream : RowStream
-        The rows that the moments are of.
-    regressors : RegressorRows
-        The regressors that the moments are of.
-    moments : Moments
-        Sums over the rows.
-    ridge : float
-        λ, relative to the number of rows.
-    corrections : int
-        Passes over the rows that take out what rounding left.
+    The ridge λ is relative to the number of rows. The moments are those of the stream's rows by these regressors;
+    `corrections` passes take out what rounding left.
     """
     tail = regressors.tail
     factor = moments.factor(ridge, tail)
@@ -266,30 +208,14 @@ def solve_weights(
 
 @dataclass(frozen=True, eq=False)
 class UnitFit:
-    """Units, and the best tail and weights for them over the rows of a stream.
+    """Units, and the best tail and weights for them over the rows of a stream."""
 
-    Attributes
-    ----------
-    regressors : Regressors
-        Kind of the units, with an affine tail.
-    theta : (h, p)
-        The units.
-    moments : Moments
-        Of the rows.
-    ridge : float
-        λ, relative to the number of rows.
-    coefficients : (1 + n + h, k)
-        Of the tail, then of the units.
-    cost : float
-        Squared errors, and the ridge's part.
-    """
-
-    regressors: Regressors
-    theta: np.ndarray
+    regressors: Regressors  # kind of the units, with an affine tail
+    theta: np.ndarray  # (h, p)
     moments: Moments
-    ridge: float
-    coefficients: np.ndarray
-    cost: float
+    ridge: float  # λ, relative to the number of rows
+    coefficients: np.ndarray  # (1 + n + h, k), of the tail, then of the units
+    cost: float  # squared errors, and the ridge's part
 
     @cached_property
     def rows(self) -> RegressorRows:
@@ -302,13 +228,7 @@ class UnitFit:
 
 
 def project_units(stream: RowStream, regressors: Regressors, theta: np.ndarray, ridge: float) -> UnitFit:
-    """Return units (h, p) with the best tail and weights for them.
-
-    Raises
-    ------
-    OutOfTime
-        If the limit on time passes.
-    """
+    """Return units (h, p) with the best tail and weights for them."""
     rows = RegressorRows(*regressors.form.factors(theta), regressors.radial)
     moments = stream.moments(rows)
     factor = moments.factor(ridge, rows.tail)
@@ -326,30 +246,14 @@ def moments_root(moments: Moments, ridge: float) -> np.ndarray:
 
 
 def step_work(rows: int, fit: UnitFit, units: int | None = None) -> float:
-    """Return the multiplications of a step of the units on so many rows, or what takes as long.
-
-    Parameters
-    ----------
-    rows : int
-        Number of rows.
-    fit : UnitFit
-        The units that move.
-    units : int, optional
-        Another number of such units.
-    """
+    """Return the multiplications, or what takes as long, of a step of the units, or of so many such, on some rows."""
     h = len(fit.theta) if units is None else units
     numbers, columns = float(h * fit.theta.shape[1]), float(fit.rows.tail + h)
     return rows * (numbers**2 / 4 + numbers * (columns + _FUNCTIONS) + 2 * columns**2) + numbers**3 / 3
 
 
 def newton_steps(stream: RowStream, start: UnitFit, *, damping: float = 1e-2) -> Iterator[UnitFit]:
-    """Yield the fit after each step of the units that lowers the cost, until hardly any step does.
-
-    Raises
-    ------
-    OutOfTime
-        If the limit on time passes.
-    """
+    """Yield the fit after each step of the units that lowers the cost, until hardly any step does."""
     fit = start
     while fit.theta.size:
         system = DampedSystem(*_gauss_newton(stream, fit))

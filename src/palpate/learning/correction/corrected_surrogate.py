@@ -49,10 +49,7 @@ def corrected_surrogate(
 def raise_surface(surface: TouchedSurface, height: float, radius: float) -> TouchedSurface:
     """Return the surface of distance d − height (m): higher everywhere along its normal.
 
-    Raises
-    ------
-    UsageError
-        If a probe of that radius (m) would then be in touch before the distance begins.
+    It is refused if a probe of that radius (m) would then be in touch before the distance begins.
     """
     if surface.reach - height < radius or surface.inner + height <= 0:
         raise UsageError(

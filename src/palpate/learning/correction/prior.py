@@ -76,21 +76,12 @@ class Discrepancy:
 
 @dataclass(frozen=True, eq=False)
 class SpecimenPrior:
-    """The changes that a specimen may show, as independent standard normal numbers.
+    """The changes that a specimen may show, as independent standard normal numbers."""
 
-    Attributes
-    ----------
-    root : (1 + n + h, z)
-        Change of the network's tail and weights, in its scaled output, by each of z numbers.
-    offset : float
-        Change of the surface's height by a last number, m.
-    expressed : float
-        Share of the slow change's variance that tail and units can follow.
-    """
-
+    # (1 + n + h, z) change of the network's tail and weights, in its scaled output, by each of z numbers
     root: np.ndarray
-    offset: float
-    expressed: float
+    offset: float  # change of the surface's height by a last number, m
+    expressed: float  # share of the slow change's variance that tail and units can follow
 
 
 def add_broad_units(energy: LearntEnergy, discrepancy: Discrepancy) -> LearntEnergy:
@@ -117,13 +108,7 @@ def add_broad_units(energy: LearntEnergy, discrepancy: Discrepancy) -> LearntEne
 
 
 def specimen_prior(energy: LearntEnergy, discrepancy: Discrepancy) -> SpecimenPrior:
-    """Return the posterior of the training with the discrepancy added: the prior of a specimen.
-
-    Raises
-    ------
-    UsageError
-        If nothing may change at all.
-    """
+    """Return the posterior of the training with the discrepancy added: the prior of a specimen."""
     net = energy.network
     scale, rows = float(net.scaling.output_scale[0]), 1 + len(net.inputs) + net.units
     parts = [np.zeros((rows, 0)) if energy.root is None else energy.root]

@@ -78,36 +78,16 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Touches:
-    """N measured touches of one specimen.
+    """N measured touches of one specimen."""
 
-    Attributes
-    ----------
-    depth : (N,)
-        s₀ into the model's surface, m.
-    normal : (N, 3)
-        ∇d.
-    base : (N, 4)
-        ℓ₀ and ∇ℓ₀ of the model.
-    lines : (N, 4, z)
-        a and B.
-    measured : (N, 3)
-        Forces, N.
-    whitening : (N, 3, 3)
-        W of the noise: W (measured − F) has unit variance.
-    law : ContactLaw
-        U₀ and its derivatives by the depth.
-    offset : float
-        σ_o, m.
-    """
-
-    depth: np.ndarray
-    normal: np.ndarray
-    base: np.ndarray
-    lines: np.ndarray
-    measured: np.ndarray
-    whitening: np.ndarray
-    law: ContactLaw
-    offset: float
+    depth: np.ndarray  # (N,) s₀ into the model's surface, m
+    normal: np.ndarray  # (N, 3) ∇d
+    base: np.ndarray  # (N, 4) ℓ₀ and ∇ℓ₀ of the model
+    lines: np.ndarray  # (N, 4, z) a and B
+    measured: np.ndarray  # (N, 3) forces, N
+    whitening: np.ndarray  # (N, 3, 3) W of the noise: W (measured − F) has unit variance
+    law: ContactLaw  # U₀ and its derivatives by the depth
+    offset: float  # σ_o, m
 
     @classmethod
     def of(

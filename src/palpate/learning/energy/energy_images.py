@@ -19,11 +19,6 @@ def images_of(solves: Solves, baseline: Baseline) -> Images | None:
     A probe's centre c becomes p₀ + M(c − p₀), p₀ the point that stays; a displacement d becomes M d, and the place of
     what is held, whose coordinates are along `solves.axes`, p₀ + M(p − p₀). Felt coordinates are turned within the
     baseline's directions. By default p₀ is the middle of the place's ranges. Further inputs stay what they are.
-
-    Raises
-    ------
-    UsageError
-        If a matrix is no isometry, turns a place off its axes, or all of them are no group.
     """
     if not len(solves.symmetry):
         return None

@@ -46,24 +46,12 @@ _FOLD_ITERATIONS = (
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """The errors of solves that are left out.
+    """The errors of solves that are left out."""
 
-    Attributes
-    ----------
-    rows : Rows
-        Rows of the least-squares problem.
-    fit : Fit
-        Of all of them.
-    errors : (R, 1) array
-        Of every weighted row, when its solve is left out.
-    together : (N,) int array
-        Samples of one number were left out together.
-    """
-
-    rows: Rows
-    fit: Fit
-    errors: np.ndarray
-    together: np.ndarray
+    rows: Rows  # of the least-squares problem
+    fit: Fit  # of all rows
+    errors: np.ndarray  # (R, 1), of every weighted row, when its solve is left out
+    together: np.ndarray  # (N,), samples of one number were left out together
 
     @property
     def mean(self) -> float:
@@ -81,30 +69,15 @@ def mean_error(rows: Rows, errors: np.ndarray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class EnergyProblem:
-    """The rows that networks of ℓ are learnt from.
+    """The rows that networks of ℓ are learnt from."""
 
-    Attributes
-    ----------
-    X : (N, n) array
-        Scaled inputs ξ.
-    rows : dict
-        What `refine` takes besides them.
-    images : Images or None
-        Of every solve.
-    ridge : float
-        A penalty on weights.
-    finest : (n,) array, optional
-        Of scaled inputs, the shortest way over which a unit may change, 0 where that is any; None where all are.
-    tolerance : float
-        Relative gain per step of the refinement below which it ends.
-    """
-
-    X: np.ndarray
-    rows: dict[str, np.ndarray]
-    images: Images | None
-    ridge: float = _RIDGE
+    X: np.ndarray  # (N, n), scaled inputs ξ
+    rows: dict[str, np.ndarray]  # what `refine` takes besides them
+    images: Images | None  # of every solve
+    ridge: float = _RIDGE  # penalty on weights
+    # (n,), scaled: the shortest way over which a unit may change, 0 for any; None where all are
     finest: np.ndarray | None = None
-    tolerance: float = TOLERANCE
+    tolerance: float = TOLERANCE  # relative gain per step of the refinement below which it ends
 
     def regressors(self, form: str, radial: RadialFunction) -> Regressors:
         """Return the regressors of a form, with their images where there is a symmetry."""

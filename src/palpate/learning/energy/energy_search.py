@@ -49,18 +49,11 @@ _SEARCH_SHARE = 0.65  # of a limit on time; the rest is for judging
 
 @dataclass(frozen=True, eq=False)
 class EnergyEnsemble(Ensemble):
-    """The networks of an energy, and what their mean misses of solves left out.
+    """The networks of an energy, and what their mean misses of solves left out."""
 
-    Attributes
-    ----------
-    left_out : LeftOut
-        What their mean misses of solves that each was refined again without; rows and fit are the best one's.
-    error : float
-        Geometric mean of what is missed, over solves, by refining again and by the closed form.
-    """
-
+    # by networks that were each refined again without a fold; rows and fit are the best one's
     left_out: LeftOut
-    error: float
+    error: float  # geometric mean over solves of what is missed by refining again and by the closed form
 
 
 def search_energy(
@@ -77,31 +70,8 @@ def search_energy(
 ) -> tuple[EnergyEnsemble, tuple[Trial, ...]]:
     """Return the mean of at most so many networks, and the records of all that were tried.
 
-    Parameters
-    ----------
-    problem : EnergyProblem
-        The solves with their weights, and the baseline whose factor is learnt.
-    form : str
-        Of a unit, or "auto".
-    radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
-        Radial function of the units; "auto" compares all three.
-    units_max : int
-        Most units of one network; images count.
-    networks : int
-        Most members of the mean.
-    target : float
-        Leave-one-solve-out error at which no more units are added.
-    budget : Budget, optional
-        Effort, and the limit on time; the default effort without a limit if left out.
-    workers : int, optional
-        Processes; see `palpate.learning.pool`.
-    seed : int
-        Decides all starts.
-
-    Raises
-    ------
-    UsageError
-        If `workers` is below 1.
+    `units_max` counts the images of one network's units; at the leave-one-solve-out error `target` no more are added.
+    "auto" tries several forms and radial functions.
     """
     budget, pool = budget or Budget(), Pool(workers)
     search = Search(problem, budget.part(_SEARCH_SHARE), pool)

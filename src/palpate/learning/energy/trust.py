@@ -26,18 +26,11 @@ _MOST = 0.98
 
 @dataclass(frozen=True, eq=False)
 class Trust:
-    """The errors that leaving solves out has shown, and the posterior that covers them.
+    """The errors that leaving solves out has shown, and the posterior that covers them."""
 
-    Attributes
-    ----------
-    root : (c, z)
-        Root of the covariance of the coefficients, tail first; calibrated. Zero for all units but the best network's.
-    errors : (N,)
-        Relative force error of each solve whose force is known, when it is left out.
-    """
-
+    # (c, z), of the coefficients' covariance, tail first, calibrated; zero for units beside the best network's
     root: np.ndarray
-    errors: np.ndarray
+    errors: np.ndarray  # (N,), relative force error of each solve whose force is known, when it is left out
 
 
 def trust_of(ensemble: EnergyEnsemble, samples: EnergySamples) -> Trust:

@@ -49,24 +49,12 @@ _GAIN = 0.99
 
 @dataclass(frozen=True, eq=False)
 class Coefficients:
-    """The coefficients that are to be learnt.
+    """The coefficients that are to be learnt."""
 
-    Attributes
-    ----------
-    X : (N, n) array
-        Scaled inputs.
-    along : (N, k) array
-        a, coefficients in the field's unit.
-    amplitude : (N,) array
-        f > 0, depth amplitude of each solve.
-    groups : (N,) int array
-        Solves that are left out together.
-    """
-
-    X: np.ndarray
-    along: np.ndarray
-    amplitude: np.ndarray
-    groups: np.ndarray
+    X: np.ndarray  # (N, n), scaled inputs
+    along: np.ndarray  # (N, k), a, coefficients in the field's unit
+    amplitude: np.ndarray  # (N,), f > 0, depth amplitude of each solve
+    groups: np.ndarray  # (N,), solves that are left out together
 
     @property
     def scale(self) -> float:
@@ -142,21 +130,12 @@ class Coefficients:
 
 @dataclass(frozen=True, eq=False)
 class LayerAtSolves:
-    """A fitted kernel layer, and its left-out error in the field's unit.
+    """A fitted kernel layer, and its left-out error in the field's unit."""
 
-    Attributes
-    ----------
-    layer : KernelLayer
-        Of scaled inputs and b over its scale.
-    error : float
-        Root mean square over surface and solves of what is missed of groups left out; infinite for one group.
-    trials : tuple of Trial
-        Records of the layers that were compared.
-    """
-
-    layer: KernelLayer
+    layer: KernelLayer  # of scaled inputs and b over its scale
+    # root mean square over surface and solves that is missed of groups left out; infinite for one group
     error: float
-    trials: tuple[Trial, ...]
+    trials: tuple[Trial, ...]  # of the layers that were compared
 
     def network(self, inputs: tuple[Range, ...], names: list[Quantity], scaling: Scaling) -> Network:
         """Return the layer as a network value; its tail and scaling are in scaled inputs."""

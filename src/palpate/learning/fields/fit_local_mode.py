@@ -147,24 +147,12 @@ _GAIN = 0.8  # of the squares in reach that are missed of columns left out: more
 
 @dataclass(frozen=True, eq=False)
 class VariationRegressors:
-    """Regressors of N solves, separate for nodes and touches.
+    """Regressors of N solves, separate for nodes and touches."""
 
-    Attributes
-    ----------
-    nodes : list of N (n_i,) int arrays
-        In reach of each probe, of its own snapshots.
-    near : list of N (n_i, 4 r) arrays
-        Products of splines in ρ and offsets at these.
-    touches : (N, q, m)
-        f times products of splines in s and polynomials.
-    shape : (r, components)
-        Number of splines in ρ, and of the field's components.
-    """
-
-    nodes: list[np.ndarray]
-    near: list[np.ndarray]
-    touches: np.ndarray
-    shape: tuple[int, int]
+    nodes: list[np.ndarray]  # N arrays (n_i,), in reach of each probe, of its own snapshots
+    near: list[np.ndarray]  # N arrays (n_i, 4 r), products of splines in ρ and offsets at these
+    touches: np.ndarray  # (N, q, m), f times products of splines in s and polynomials
+    shape: tuple[int, int]  # number of splines in ρ, and of the field's components
 
     def images(self, table: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Return a variation's table (rows, 4 r, components) at the touch of each solve, f included."""
@@ -177,18 +165,8 @@ def fit_variation(
 ) -> Variation | None:
     """Return the variation of the local mode of fields, not yet faded out.
 
-    None where it is of no use: with one group alone, or where it gains little of columns left out.
-
-    Parameters
-    ----------
-    solves : Solves
-        The solves in contact from which it is learnt.
-    remainder : list of (N, P, components) arrays
-        Fields of the snapshots, less what the local mode gives.
-    local_mode : LocalMode
-        The mode that is to vary from place to place.
-    amplitude : DepthAmplitude
-        The growth f(s) of the field with depth.
+    None where it is of no use: with one group alone, or where it gains little of columns left out. The remainder is (N,
+    P, components) for each snapshots: its fields, less what the local mode gives.
     """
     parts = fold_masks(solves.groups, FOLDS)
     if len(parts) < 2:
@@ -301,16 +279,9 @@ def _best_base(fit: _Fit, parts: list[np.ndarray]) -> tuple[float, float]:
 
 
 def by_conjugate_gradients(grams: np.ndarray, touches: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """W (k, R, c) with Σ_i t_i ⊗ (G_i (t_i · W)) + μ W = Σ_i t_i ⊗ s_i, for all c components.
+    """Return W (k, R, c) with Σ_i t_i ⊗ (G_i (t_i · W)) + μ W = Σ_i t_i ⊗ s_i, for all c components.
 
-    Parameters
-    ----------
-    grams : (N, R, R)
-        G, symmetric and non-negative.
-    touches : (N, k)
-        t.
-    sides : (N, R, c)
-        s.
+    G are `grams` (N, R, R), symmetric and non-negative, t `touches` (N, k), s `sides` (N, R, c).
     """
     from scipy.sparse.linalg import LinearOperator, cg
 

@@ -82,12 +82,19 @@ def learn_snapshots(
     workers: int | None = None,
     seed: int = 0,
 ) -> LearntField:
-    """Learn a field on a mesh from snapshots on the meshes that they were solved on; the options are `learn_field`'s.
+    """Learn a field on a mesh from snapshots on the meshes that they were solved on.
+
+    Parameters
+    ----------
+    snapshots : sequence of Snapshots
+        Solves, each on a mesh of its own.
 
     Raises
     ------
     UsageError
         If an option is not one, or no snapshot has contact.
+
+    Notes ----- The other parameters are those of `learn_field`.
     """
     if amplitude != "auto" and amplitude not in AMPLITUDES:
         raise UsageError(

@@ -52,34 +52,17 @@ class Snapshots:
 
 @dataclass(frozen=True, eq=False)
 class Solves:
-    """Snapshots in contact, and all that is known beside them.
+    """Snapshots in contact, and all that is known beside them."""
 
-    Attributes
-    ----------
-    snapshots : tuple of Snapshots
-        One for each mesh that solves were made on.
-    inputs : n ranges
-        Names, units and ranges of the inputs.
-    surface : TouchedSurface
-        The surface that the probe touches.
-    radius : float
-        Of the probe, m; where it is an input, a usual one.
-    points, triangles, mass : (nodes, 3), (t, 3), (nodes,) arrays
-        Of the mesh that the field is shown on.
-    radius_input : int or None
-        The input that is the radius.
-    interpolations : tuple of SurfaceInterpolation or None
-        From the nodes of each snapshots to those; None where they are the same.
-    """
-
-    snapshots: tuple[Snapshots, ...]
+    snapshots: tuple[Snapshots, ...]  # one for each mesh that solves were made on
     inputs: tuple[Range, ...]
-    surface: TouchedSurface
-    radius: float
-    points: np.ndarray
-    triangles: np.ndarray
-    mass: np.ndarray
-    radius_input: int | None
+    surface: TouchedSurface  # that the probe touches
+    radius: float  # of the probe, m; where it is an input, a usual one
+    points: np.ndarray  # (nodes, 3), at rest, m, of the mesh that the field is shown on
+    triangles: np.ndarray  # (t, 3)
+    mass: np.ndarray  # (nodes,)
+    radius_input: int | None  # the input that is the radius
+    # to that mesh; None where it is the snapshots' own
     interpolations: tuple[SurfaceInterpolation | None, ...]
 
     @classmethod

@@ -12,9 +12,20 @@ __all__ = ["held_loads", "load_unload_reload", "random_times", "random_turns"]
 def random_turns(
     rng: np.random.Generator, low: float, high: float, *, turns: int = 6, step: float, outward: float = 0.0
 ) -> np.ndarray:
-    """Return loads (N,) in N that go to and fro between random turning points, in steps of `step` N at most, back to 0.
+    """Return loads (N,) in N that go to and fro between random turning points, and back to 0.
 
-    The points are even over the range; `outward` above 0 draws them to its ends, where a body yields most.
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Decides the turning points, which are even over the range.
+    low, high : float
+        Range of the loads, N.
+    turns : int
+        Number of turning points.
+    step : float
+        Largest step from load to load, N.
+    outward : float
+        Above 0 it draws the points to the ends of the range, where a body yields most.
     """
     share = rng.uniform(-1.0, 1.0, turns)
     share = np.sign(share) * np.abs(share) ** (1.0 / (1.0 + outward))
@@ -22,7 +33,17 @@ def random_turns(
 
 
 def load_unload_reload(rng: np.random.Generator, low: float, high: float, *, step: float) -> np.ndarray:
-    """Return loads (N,) in N: to a peak, back a part of the way, further than before, and off."""
+    """Return loads (N,) in N: to a peak, back a part of the way, further than before, and off.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Decides the peak and the ways.
+    low, high : float
+        Range of the loads, N.
+    step : float
+        Largest step from load to load, N.
+    """
     end = high if low >= 0 or rng.random() < 0.5 else low
     peak = end * rng.uniform(0.5, 1.0)
     back, further = peak * rng.uniform(0.0, 0.8), peak + (end - peak) * rng.random()
@@ -42,9 +63,18 @@ def even_steps(knots: np.ndarray, step: float) -> np.ndarray:
 def random_times(
     rng: np.random.Generator, low: float, high: float, *, span: float, step: float, slowest: float = 3.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return times (N,) in s, in steps of `step`, and loads (N,) in N.
+    """Return times (N,) in s and loads (N,) in N: even ramps between random loads, every third one a hold.
 
-    Even ramps between random loads that take 0.05 s to `slowest` seconds, every third one a hold, none at the start.
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Decides loads and times.
+    low, high : float
+        Range of the loads, N.
+    span, step : float
+        Length and step of the times, s.
+    slowest : float
+        Longest time of a ramp, s; the shortest is 0.05 s.
     """
     times = np.arange(1, round(span / step) + 1) * step
     knots_t, knots_p = [0.0], [0.0]
@@ -56,7 +86,17 @@ def random_times(
 
 
 def held_loads(size: float, *, ramp: float, span: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return times (N,) in s and loads (N,) in N: put on within `ramp`, held to `span`, times growing geometrically."""
+    """Return times (N,) in s, which grow geometrically, and loads (N,) in N that are put on and held.
+
+    Parameters
+    ----------
+    size : float
+        The load that is held, N.
+    ramp, span : float
+        Times at which it is all there and at which the hold ends, s.
+    count : int
+        Number of times during the hold.
+    """
     on = np.linspace(0.0, ramp, 6)[1:]
     times = np.concatenate([on, ramp + np.geomspace(ramp / 2, span - ramp, count)])
     return times, size * np.minimum(times / ramp, 1.0)

@@ -60,6 +60,10 @@ def step_hold(
     times : (N,)
         Times after the press at which it is looked at, s, positive and ascending. The press itself is put first,
         a microsecond after the start.
+    inward : (3,)
+        Direction of the press.
+    name : str
+        Name of the drive.
 
     Raises
     ------
@@ -81,7 +85,20 @@ def ramp(
     fall: float = 0.0,
     inward: Vector = DOWN,
 ) -> Drive:
-    """An even press to a depth (m) in `rise` seconds, held for `hold` and drawn back in `fall` seconds.
+    """An even press that is held and drawn back.
+
+    Parameters
+    ----------
+    touch : (3,)
+        Centre of the probe at first touch, m.
+    depth : float
+        Depth that is reached, m.
+    rise, hold, fall : float
+        Times of the press, the hold and the way back, s.
+    dt : float
+        Sampling step, s.
+    inward : (3,)
+        Direction of the press.
 
     Raises
     ------
@@ -104,7 +121,22 @@ def sinusoid(
     cycles: float = 3.0,
     inward: Vector = DOWN,
 ) -> Drive:
-    """Depth (m) that swings by an amplitude (m) about a mean, at a frequency in Hz; it starts from the mean.
+    """Depth that swings about a mean; it starts from the mean.
+
+    Parameters
+    ----------
+    touch : (3,)
+        Centre of the probe at first touch, m.
+    depth, amplitude : float
+        Mean of the depth and how far it swings, m.
+    frequency : float
+        In Hz.
+    dt : float
+        Sampling step, s.
+    cycles : float
+        Number of periods.
+    inward : (3,)
+        Direction of the press.
 
     Raises
     ------
@@ -132,8 +164,8 @@ def random_drive(
 ) -> Drive:
     """Pressing, sliding and lifting off at random.
 
-    Depth and both coordinates along the surface are sums of sinusoids with random phases and frequencies below
-    `band`, so the motion doesn't depend on `dt`.
+    Depth and both coordinates along the surface are sums of sinusoids with random phases and frequencies below `band`,
+    so the motion doesn't depend on `dt`.
 
     Parameters
     ----------
@@ -151,6 +183,8 @@ def random_drive(
         Highest frequency, Hz.
     lifted : float
         Share of the time without contact, in [0, 1).
+    inward : (3,)
+        Direction of the press.
 
     Raises
     ------

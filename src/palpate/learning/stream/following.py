@@ -59,15 +59,7 @@ class Following:
 
 
 class Follower:
-    """A tracker, the readings it saw last, and the search for better scales.
-
-    Parameters
-    ----------
-    following : Following
-        Sizes.
-    inputs, outputs : int
-        n and m, in scaled quantities.
-    """
+    """A tracker of n inputs and m outputs, scaled, the readings it saw last, and the search for better scales."""
 
     def __init__(self, following: Following, inputs: int, outputs: int) -> None:
         self.following = following

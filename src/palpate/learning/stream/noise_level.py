@@ -26,15 +26,7 @@ _SHARE = 0.01  # of a reading in the outputs' shares
 
 
 class NoiseLevel:
-    """Variance of a reading's noise by place, and shares of the outputs in it.
-
-    Parameters
-    ----------
-    noise : float
-        Variance to begin with.
-    inputs, outputs : int
-        n and m.
-    """
+    """Variance of a reading's noise by place, which begins with one for all, and shares of the m outputs in it."""
 
     def __init__(self, noise: float, inputs: int, outputs: int) -> None:
         self._log = np.zeros(1 + inputs)

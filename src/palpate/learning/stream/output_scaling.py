@@ -24,17 +24,10 @@ _SPIKE = 5.0  # times the distance of all of these
 
 @dataclass(frozen=True, eq=False)
 class OutputScaling:
-    """A scaling, and output modes to learn in.
+    """A scaling, and output modes to learn in."""
 
-    Attributes
-    ----------
-    scaling : Scaling
-        Centres and scales of inputs and outputs.
-    directions : (m, r), optional
-        Orthonormal; the filter's outputs are the scaled ones along them.
-    """
-
-    scaling: Scaling
+    scaling: Scaling  # centres and scales of inputs and outputs
+    # (m, r), orthonormal; the filter's outputs are the scaled ones along them
     directions: np.ndarray | None = None
 
     @property

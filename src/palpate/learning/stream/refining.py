@@ -83,33 +83,16 @@ class Refining:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """The state that one iteration leaves to the next.
+    """The state that one iteration leaves to the next."""
 
-    Attributes
-    ----------
-    damping : float
-        Levenberg–Marquardt damping of the next step.
-    gain : float
-        By how much it lowered the cost, relative; 0 before the first.
-    rms : float
-        Root mean square error over the reservoir, per scaled output.
-    expected : float
-        The same over the judging samples, before they were fitted too.
-    scout : (h', p), optional
-        Units on trial: they were iterated from, but have not become better than the state's yet.
-    since : int
-        Iterations of theirs so far.
-    failed : int
-        Trials that failed since the last one that did not.
-    """
-
-    damping: float = 1e-2
-    gain: float = 0.0
-    rms: float = float("nan")
-    expected: float = float("nan")
+    damping: float = 1e-2  # Levenberg–Marquardt damping of the next step
+    gain: float = 0.0  # by how much it lowered the cost, relative; 0 before the first
+    rms: float = float("nan")  # root mean square error over the reservoir, per scaled output
+    expected: float = float("nan")  # the same over the judging samples, before they were fitted too
+    # (h', p) units on trial: iterated from, but not better than the state's yet
     scout: np.ndarray | None = None
-    since: int = 0
-    failed: int = 0
+    since: int = 0  # iterations of the units on trial so far
+    failed: int = 0  # trials that failed since the last one that did not
 
 
 def refined_state(

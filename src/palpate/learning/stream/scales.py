@@ -33,27 +33,14 @@ _ASIDE = 0.2  # share of the readings that may be
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """Scales of a map, in scaled inputs and outputs.
+    """Scales of a map, in scaled inputs and outputs."""
 
-    Attributes
-    ----------
-    lengths : (n,)
-        ℓ: distances along each input over which the map's values are alike; widths of the units.
-    variance : float
-        s², prior variance of what the affine tail does not explain.
-    noise : float
-        η s², variance of a reading.
-    tail : float
-        Prior variance of the affine tail's coefficients.
-    centre : (m,)
-        Prior mean of the map.
-    """
-
+    # (n,) ℓ: distances along each input over which the map's values are alike; widths of the units
     lengths: np.ndarray
-    variance: float
-    noise: float
-    tail: float
-    centre: np.ndarray
+    variance: float  # s², prior variance of what the affine tail does not explain
+    noise: float  # η s², variance of a reading
+    tail: float  # prior variance of the affine tail's coefficients
+    centre: np.ndarray  # (m,) prior mean of the map
 
     @classmethod
     def vague(cls, inputs: int, outputs: int) -> Scales:
@@ -66,19 +53,8 @@ def search_scales(
 ) -> Generator[None, None, tuple[Scales, float]]:
     """Search the likeliest scales, yielding after every density that was computed.
 
-    Parameters
-    ----------
-    X, Y : (N, n), (N, m)
-        Readings in scaled quantities.
-    noise : (N,)
-        D, their variances over the mean variance.
-    start : Scales
-        Where the search begins.
-
-    Returns
-    -------
-    Scales, float
-        The likeliest, and by how much its log density is above the start's.
+    The readings X (N, n) and Y (N, m) are in scaled quantities; `noise` (N,) is D, their variances over the mean
+    variance. Returned are the likeliest, and by how much its log density is above the start's.
     """
     v = np.log(np.append(start.lengths, start.noise / start.variance))
     low = np.log(np.append(np.full(X.shape[1], _SHORTEST), _NOISES[0]))

@@ -57,16 +57,8 @@ _FINEST, _COARSEST = 1e-7, 1e-2  # bounds of that, relative to s²
 class Tracker:
     """The bank of filters: `update` with one reading at a time, `predict` with the mixture of the bank.
 
-    Parameters
-    ----------
-    scales : Scales
-        Prior of the map.
-    inputs, outputs : int
-        n and m.
-    units_max : int
-        Units at most.
-    count : int
-        Readings that went before those it will see.
+    The scales are the prior of the map from n inputs to m outputs; the bank has `units_max` units at most, and `count`
+    readings went before those it will see.
     """
 
     def __init__(self, scales: Scales, inputs: int, outputs: int, units_max: int, count: int = 0) -> None:

@@ -119,7 +119,17 @@ def TipLoad(
     direction: tuple[float, float] = (0.0, -1.0),
     name: str = "P",
 ) -> PointLoad:
-    """A load at the tip of a beam, between `low` and `high` N; by default it pushes down."""
+    """A load at the tip of a beam.
+
+    Parameters
+    ----------
+    low, high : float
+        Range of the load, N.
+    direction : (2,)
+        Its direction in the plane of the beam; by default it pushes down.
+    name : str
+        Name of the input.
+    """
     return PointLoad(name, None, low, high, direction)
 
 

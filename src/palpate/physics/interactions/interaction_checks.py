@@ -162,7 +162,13 @@ def free_motions(field: Any, attached: Iterable[Attached]) -> np.ndarray:
 
 
 def require_support(field: Any, attached: Iterable[Attached]) -> None:
-    """Refuse a body that could float away."""
+    """Refuse a body that could float away.
+
+    Raises
+    ------
+    UsageError
+        If a rigid motion of the body is free.
+    """
     loose = free_motions(field, attached)
     if not len(loose):
         return

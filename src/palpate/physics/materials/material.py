@@ -170,8 +170,15 @@ class Material(Protocol):
 class Elastic:
     """Base of all laws: the sum of distortion and volumetric part, and the description.
 
-    A law is a frozen dataclass with `name`, `source` and `density`, that gives `law` (in words), the four moduli,
-    `volumetric` and `distortion`; or `energy` where it has no separate volumetric part.
+    A law is a frozen dataclass that gives `law` (in words), the four moduli, `volumetric` and `distortion`; or `energy`
+    where it has no separate volumetric part.
+
+    Attributes
+    ----------
+    name, source : str
+        Name of the material, and where its constants come from.
+    density : float
+        In kg/m³.
     """
 
     name: str

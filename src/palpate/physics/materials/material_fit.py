@@ -106,6 +106,8 @@ class MaterialFit:
         Root mean square of the residuals over their scale, a pure number.
     keys : mapping or None
         Constants as keys of a study file's material; None of a law that has none.
+    curves : tuple of pairs of arrays
+        Of tests with an indenter, the fitted course: depths in m and forces in N.
     """
 
     material: Any

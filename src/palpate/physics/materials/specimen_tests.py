@@ -97,7 +97,7 @@ class StretchTest:
 
         Parameters
         ----------
-        mode, stress, measure, name
+        mode, stress, measure, name : str, (N,) array, str, str
             As for the class.
         strain : (N,) array
             Engineering strain λ − 1, a pure number: 0.5 for 50 %.

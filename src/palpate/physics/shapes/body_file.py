@@ -312,6 +312,11 @@ class SurfacePatch:
         Returns
         -------
         (n,) bool array
+
+        Raises
+        ------
+        UsageError
+            If `facing` needs normals that are missing, or a surface of `faces` is not among the names.
         """
         if self.where is not None:
             inside = np.asarray(self.where(centres), dtype=bool)

@@ -220,6 +220,11 @@ class Solid(Shape):
         ----------
         what : str
             The shape in words, as the message begins: ``"The block"``.
+
+        Raises
+        ------
+        UsageError
+            If the body is shorter than 1 mm or longer than 10 m, or an element is longer than the body.
         """
         require_size(what, max(self.size))
         if self.element is not None and checks.positive("The element size", self.element, "m") > max(

@@ -75,18 +75,10 @@ def _trim_triangle(lower: np.ndarray, start: int, stop: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Full:
-    """P over z = [tail, unit by unit (w, θ)].
+    """P over z = [tail, unit by unit (w, θ)]."""
 
-    Attributes
-    ----------
-    lower : (d, d)
-        Its lower triangle; what is above the diagonal means nothing.
-    tail : int
-        Unknowns of the tail, which come first.
-    """
-
-    lower: np.ndarray
-    tail: int
+    lower: np.ndarray  # (d, d), its lower triangle; what is above the diagonal means nothing
+    tail: int  # number of unknowns of the tail, which come first
 
     @classmethod
     def prior(cls, tail: int, variance: float) -> Full:
@@ -124,18 +116,10 @@ class Full:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """A block-diagonal P.
+    """A block-diagonal P."""
 
-    Attributes
-    ----------
-    first : (a, a)
-        The tail's.
-    units : (h, b, b)
-        Each unit's, over (w, θ).
-    """
-
-    first: np.ndarray
-    units: np.ndarray
+    first: np.ndarray  # (a, a), covariance of the coefficients of the tail
+    units: np.ndarray  # (h, b, b), covariance of each unit over (w, θ)
 
     @classmethod
     def prior(cls, tail: int, variance: float, size: int) -> Blocks:
@@ -196,18 +180,10 @@ def _downdated(P: np.ndarray, K: np.ndarray, B: np.ndarray, growth: float, added
 
 @dataclass(frozen=True, eq=False)
 class Shared:
-    """One covariance of all outputs' coefficients and one of the shapes, as triangles.
+    """One covariance of all outputs' coefficients and one of the shapes, as triangles."""
 
-    Attributes
-    ----------
-    regressors : (p_t + h, p_t + h)
-        P_φ, lower triangle.
-    shapes : (h p, h p)
-        P_θ, lower triangle.
-    """
-
-    regressors: np.ndarray
-    shapes: np.ndarray
+    regressors: np.ndarray  # (p_t + h, p_t + h), lower triangle of P_φ
+    shapes: np.ndarray  # (h p, h p), lower triangle of P_θ
 
     @classmethod
     def prior(cls, tail: int, variance: float) -> Shared:

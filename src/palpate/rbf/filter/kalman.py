@@ -36,8 +36,9 @@ __all__ = [
     "step_excess",
 ]
 
-TRIES = 5  # with R enlarged from one to the next; a step that is too long in all of them is not taken
-_MEMORY = 0.95  # about twenty observations: long enough to be smooth, short enough to follow the convergence
+TRIES = 5  # updates with a larger R each; a step that is too long in all of them is not taken
+# share that the past keeps: about twenty observations, smooth and still quick enough to follow
+_MEMORY = 0.95
 
 
 def running_mean_square(previous: float, error: np.ndarray, count: int) -> float:
@@ -91,22 +92,11 @@ def kalman_update(
     refuses: Callable[[np.ndarray], bool] | None = None,
     donate: bool = False,
 ) -> State:
-    """Return the state after one observation.
+    """Return the state after one observation of values, slopes and curvatures of the map at one place.
 
-    Parameters
-    ----------
-    state : State
-        Before it.
-    observation : Observation
-        Values, slopes and curvatures of the map at one place.
-    prediction : (q,), (q, d)
-        The state's own measurement there and its derivatives by z.
-    settings : Settings
-        Noise, step bound, iterations and forgetting of the update.
-    refuses : callable, optional
-        Says of parameters z (d,) that they may not be taken; by default the remembered observations decide.
-    donate : bool
-        Whether the old covariance may be overwritten.
+    The prediction is the state's own measurement there (q,) and its derivatives (q, d) by z. `refuses` says of
+    parameters z (d,) that they may not be taken; by default the remembered observations decide. With `donate` the old
+    covariance may be overwritten. Of the settings, noise, step bound, iterations and forgetting count.
     """
     if refuses is None:
 

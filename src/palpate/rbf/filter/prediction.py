@@ -114,24 +114,18 @@ def _rows(
 
 
 def predictive_deviation(state: State, X: np.ndarray, settings: Settings) -> np.ndarray:
-    """Standard deviation (N, m) of what would be measured at X (N, n), all scaled.
+    """Return the standard deviation (N, m) of what would be measured at X (N, n), all scaled.
 
-    Raises
-    ------
-    UsageError
-        If the update rule keeps no covariance.
+    States whose update rule keeps no covariance are refused.
     """
     r = max(settings.noise, settings.noise_share * state.innovation)
     return np.asarray(np.sqrt(np.maximum(predictive_variance(state, X, settings), 0.0) + r))
 
 
 def predictive_variance(state: State, X: np.ndarray, settings: Settings) -> np.ndarray:
-    """Variance h P hᵀ (N, m) of the network's outputs at X (N, n), all scaled.
+    """Return the variance h P hᵀ (N, m) of the network's outputs at X (N, n), all scaled.
 
-    Raises
-    ------
-    UsageError
-        If the update rule keeps no covariance.
+    States whose update rule keeps no covariance are refused.
     """
     X, P = np.asarray(X, float), state.covariance
     parts = [X[i : i + _CHUNK] for i in range(0, len(X), _CHUNK)]

@@ -159,7 +159,14 @@ class State:
 def initial(inputs: int, outputs: int, settings: Settings, modes: np.ndarray | None = None) -> State:
     """The state before the first observation: no units, zero tail with its prior variance.
 
-    `modes` (m, r) are orthonormal output directions for the shared-weight rule.
+    Parameters
+    ----------
+    inputs, outputs : int
+        n and m.
+    settings : Settings
+        Settings of the filter.
+    modes : (m, r) array, optional
+        Orthonormal output directions for the shared-weight rule.
     """
     regressors = settings.regressors(inputs)
     p, p_t = regressors.form.size, regressors.tail_size

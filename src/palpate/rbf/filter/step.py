@@ -89,7 +89,19 @@ def step(
 def observe(
     state: State, observation: Observation, settings: Settings, *, donate: bool = False
 ) -> tuple[State, Event]:
-    """Learn one observation that may have a weight, slopes and curvatures; else as `step`."""
+    """Learn one observation that may have a weight, slopes and curvatures; else as `step`.
+
+    Parameters
+    ----------
+    state : State
+        Before the observation.
+    observation : Observation
+        Values, slopes and curvatures at one place.
+    settings : Settings
+        Settings of the filter.
+    donate : bool
+        Whether the old state's covariance may be overwritten.
+    """
     if observation.flaw:
         return state, Event(np.nan, np.nan, False, False, 0, state.units, observation.flaw)
     old, prediction = state, predict_observation(state, observation, settings)

@@ -26,10 +26,10 @@ __all__ = [
     "next_damping",
 ]
 
-DAMPING = (1e-12, 1e12)
-MORE = 4.0  # times the damping, where it did not help
+DAMPING = (1e-12, 1e12)  # least and largest damping
+MORE = 4.0  # factor of the damping after a step that did not help
 _LONGEST = 1.0  # largest change of a log width, or of a centre in units of its width, in one iteration
-_FLOOR = 1e-2  # of the mean curvature: a unit of hardly any weight would else move freely
+_FLOOR = 1e-2  # share of the mean curvature: a unit of hardly any weight would else move freely
 
 
 class DampedSystem:
@@ -66,24 +66,12 @@ class DampedSystem:
 
 @dataclass(frozen=True, eq=False)
 class LevenbergStep:
-    """Outcome of one iteration.
+    """Outcome of one iteration."""
 
-    Attributes
-    ----------
-    theta : (h, p)
-        Units; where they started if no damping helped.
-    fit : Fit
-        The best weights and tail for them.
-    damping : float
-        To begin the next iteration with.
-    gain : float
-        By how much the cost fell through the units' move.
-    """
-
-    theta: np.ndarray
-    fit: Fit
-    damping: float
-    gain: float
+    theta: np.ndarray  # (h, p), units; where they started if no damping helped
+    fit: Fit  # the best weights and tail for them
+    damping: float  # the next iteration begins with it
+    gain: float  # by how much the cost fell through the units' move
 
 
 def damped_step(

@@ -39,10 +39,7 @@ from palpate.rbf.refinement.rows import Rows
 from palpate.rbf.regressors import Regressors
 from palpate.rbf.sample_checks import numbers, samples
 
-__all__ = [
-    "Posterior",
-    "posterior",
-]
+__all__ = ["Posterior", "posterior"]
 
 
 def _inverse(information: np.ndarray) -> np.ndarray:
@@ -61,8 +58,8 @@ def _inverse(information: np.ndarray) -> np.ndarray:
     return np.asarray((covariance + covariance.T) / 2)
 
 
-_LEAST_RIDGE = 1e-14  # of the sum of weights: coinciding units would leave no inverse
-_LEAST_NOISE = 1e-16  # mean square of scaled outputs: round-off
+_LEAST_RIDGE = 1e-14  # ridge over the sum of weights: coinciding units would leave no inverse
+_LEAST_NOISE = 1e-16  # mean square of scaled outputs that is round-off
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,32 +24,18 @@ __all__ = ["Fit", "Solver", "gauss_newton", "leverage_of_units", "project", "spa
 
 Solver = Literal["kaufman", "full"]
 
-_TAIL_PENALTY = 1e-24  # of round-off's size, so that duplicate samples can't make R singular
+_TAIL_PENALTY = 1e-24  # penalty of round-off's size, so that duplicate samples can't make R singular
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Least-squares solution for one θ.
+    """Least-squares solution for one θ."""
 
-    Attributes
-    ----------
-    coefficients : (c, k)
-        Of the tail, then of the units, per mode.
-    residual : (R, k)
-        Weighted targets less the fit, per mode.
-    cost : float
-        ‖residual‖² + penalty ‖weights‖².
-    reflectors : (R + c, c)
-        Q as LAPACK keeps it, with R in the upper triangle.
-    tau : (c,)
-        Factors of the Householder reflectors.
-    """
-
-    coefficients: np.ndarray
-    residual: np.ndarray
-    cost: float
-    reflectors: np.ndarray
-    tau: np.ndarray
+    coefficients: np.ndarray  # (c, k), of the tail, then of the units, per mode
+    residual: np.ndarray  # (R, k), weighted targets less the fit, per mode
+    cost: float  # ‖residual‖² + penalty ‖weights‖²
+    reflectors: np.ndarray  # (R + c, c), Q as LAPACK keeps it, with R in the upper triangle
+    tau: np.ndarray  # (c,), factors of the Householder reflectors
 
     @property
     def R(self) -> np.ndarray:

@@ -26,45 +26,19 @@ __all__ = ["Rows"]
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """A weighted least-squares problem in the outputs' modes; R rows, k modes.
+    """A weighted least-squares problem in the outputs' modes; R rows, k modes."""
 
-    Attributes
-    ----------
-    regressors : Regressors
-        Kind of units and tail.
-    X : (N, n)
-        Where values are known.
-    scale : (N,)
-        √w of the value rows.
-    sloped : (S,) int
-        Samples of which some slope is known too.
-    slope_scale : (S, n)
-        √(w s) of their rows; a slope of no weight has no row.
-    targets : (R, k)
-        Already weighted: N values, then the slopes sample by sample, then the curvatures.
-    modes : (k, m)
-        Orthonormal; outputs are targets @ modes.
-    total : float
-        Sum of the weights w.
-    curved : (C,) int
-        Samples of which some curvature is known too.
-    curvature_scale : (C, n(n+1)/2)
-        √(w e c) of their rows.
-    groups : (N,) int
-        Samples of one group are judged together: images of one solve under a symmetry, say.
-    """
-
-    regressors: Regressors
-    X: np.ndarray
-    scale: np.ndarray
-    sloped: np.ndarray
-    slope_scale: np.ndarray
-    targets: np.ndarray
-    modes: np.ndarray
-    total: float
-    curved: np.ndarray
-    curvature_scale: np.ndarray
-    groups: np.ndarray
+    regressors: Regressors  # kind of units and tail
+    X: np.ndarray  # (N, n), places where values are known
+    scale: np.ndarray  # (N,), √w of the value rows
+    sloped: np.ndarray  # (S,) int, samples of which some slope is known too
+    slope_scale: np.ndarray  # (S, n), √(w s) of their rows; a slope of no weight has no row
+    targets: np.ndarray  # (R, k), weighted: N values, then slopes sample by sample, then curvatures
+    modes: np.ndarray  # (k, m), orthonormal; outputs are targets @ modes
+    total: float  # sum of the weights w
+    curved: np.ndarray  # (C,) int, samples of which some curvature is known too
+    curvature_scale: np.ndarray  # (C, n(n+1)/2), √(w e c) of their rows
+    groups: np.ndarray  # (N,) int; one group is judged together: images of one solve under a symmetry, say
 
     @classmethod
     def of(
@@ -80,17 +54,12 @@ class Rows:
         curvature_weight: float | np.ndarray = 1.0,
         groups: np.ndarray | None = None,
     ) -> Rows:
-        """The rows of X (N, n), Y (N, m) and of all that is known of them besides.
+        """Return the rows of X (N, n), Y (N, m) and of all that is known of them besides.
 
         That is weights w (N,), slopes ∂y_j/∂x_l (N, m, n) with s (N,) or (N, n), curvatures ∂²y_j/∂x_l∂x_k
-        (N, m, n(n+1)/2), l ≤ k, with c (N,) or (N, n(n+1)/2), and groups (N,); each sample is one by default.
-        Samples of no weight are left out; so are slopes and curvatures of no weight, which may then be
-        not-a-number.
-
-        Raises
-        ------
-        UsageError
-            If shapes disagree, or a weight is negative or a number that counts is not finite.
+        (N, m, n(n+1)/2), l ≤ k, with c (N,) or (N, n(n+1)/2), and groups (N,); each sample is one by default. Samples
+        of no weight are left out; so are slopes and curvatures of no weight, which may then be not-a-number. Weights
+        are not negative, and numbers that count are finite.
         """
         n = regressors.form.inputs
         X, Y, w, slopes, s = samples(X, Y, weights, slopes, slope_weight=slope_weight, inputs=n)
@@ -132,13 +101,7 @@ class Rows:
         slope_weight: float | np.ndarray | None = None,
         curvature_weight: float | np.ndarray | None = None,
     ) -> Rows:
-        """Rows of X (N, n) whose targets do not matter; slopes and curvatures are among them if they have a weight.
-
-        Raises
-        ------
-        UsageError
-            As `of`.
-        """
+        """Return rows of X (N, n) whose targets do not matter, with slopes and curvatures if these have a weight."""
         X = numbers("Inputs X", X, (None, regressors.form.inputs), finite=False)
         N, n = X.shape
         known: dict[str, Any] = {}

@@ -42,10 +42,11 @@ __all__ = ["ContactBaseline", "depth_series"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
-_STEP = 1e-3  # of the radius: the difference that finds the third derivative of the distance
-_FINEST = 1.0 / 40.0  # of the probe's radius
-_SAME_PLACE = 0.02  # of the radius: how near to each other two contact points are one
-_FACTORS = (1.0, 0.3, 3.0, 0.1, 10.0)  # of the guessed crossing length
+# step over the probe's radius, of the difference that finds the third derivative of the distance
+_STEP = 1e-3
+_FINEST = 1.0 / 40.0  # shortest way over which touches change, over the probe's radius
+_SAME_PLACE = 0.02  # distance over the probe's radius within which two contact points are one
+_FACTORS = (1.0, 0.3, 3.0, 0.1, 10.0)  # candidates of the crossing length, over the guessed one
 _TWICE, _FACTOR, _LENGTH, _RADIUS, _RADIUS_INPUT, _STEP_AT = range(6)  # places in the numbers of a contact
 
 

@@ -19,7 +19,7 @@ from palpate.errors import UsageError
 __all__ = ["HIGHEST", "Stiffening", "exponents", "powers", "stiffening_into"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
-HIGHEST = 5  # degree
+HIGHEST = 5  # highest degree of the polynomial
 
 
 def exponents(count: int, degree: int) -> np.ndarray:

@@ -48,7 +48,7 @@ __all__ = [
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 # a product and a sum rounded once: faster, and no less exact
 _fused = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-FRAME = 8
+FRAME = 8  # numbers of a place before the further inputs
 SIXTH = 1.0 / 6.0
 
 
@@ -225,18 +225,10 @@ def profile_arguments(local_mode: LocalMode | None, deepest: float) -> tuple[Any
 def moving_values(
     local_mode: LocalMode, deepest: float, touches: np.ndarray, points: np.ndarray
 ) -> np.ndarray:
-    """The local mode (N, P, components), f included, as if all points were on the touched surface.
+    """Return the local mode (N, P, components), f included, as if all points were on the touched surface.
 
-    Parameters
-    ----------
-    local_mode : LocalMode
-        The mode that moves with the probe.
-    deepest : float
-        s* of the amplitude, m.
-    touches : (N, 8 + p)
-        Depth s (m), f, contact point (m), normal, further inputs.
-    points : (P, 3)
-        At rest, m.
+    `deepest` is s* of the amplitude, m. A touch is a row of (N, 8 + p): depth s (m), f, contact point (m), normal,
+    further inputs. The points (P, 3) are places at rest, m.
     """
     components = 1 if len(local_mode.table) == 1 else 3
     arguments = profile_arguments(local_mode, deepest)

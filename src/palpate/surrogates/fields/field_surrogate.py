@@ -35,11 +35,7 @@ from palpate.units import Range, bounds
 if TYPE_CHECKING:
     from palpate.surrogates.energy import LearntEnergy
 
-__all__ = [
-    "FieldErrors",
-    "FieldSurrogate",
-    "sizes_of",
-]
+__all__ = ["FieldErrors", "FieldSurrogate", "sizes_of"]
 
 _SHOWN = {"m": (1e3, "mm"), "Pa": (1e-3, "kPa")}  # factor and unit in which people read
 

@@ -31,15 +31,7 @@ from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.surrogates.surface import TouchedSurface
 
-__all__ = [
-    "OFFSETS",
-    "LocalMode",
-    "Variation",
-    "design",
-    "polynomials",
-    "products",
-    "splines",
-]
+__all__ = ["OFFSETS", "LocalMode", "Variation", "design", "polynomials", "products", "splines"]
 
 OFFSETS = 4  # 1 and three coordinates of the offset
 

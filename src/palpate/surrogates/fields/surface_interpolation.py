@@ -16,23 +16,15 @@ __all__ = ["SurfaceInterpolation", "node_normals"]
 NEAREST = 20  # nodes that decide a value
 FACING = 0.5  # how far a normal turned by 1 rad sets a node back, over the distance of nodes around
 TAIL = 6  # terms of a quadratic in two coordinates
-RIDGE = 1e-10  # of the system: where nodes coincide or lie on a conic in the tangent plane
+RIDGE = 1e-10  # ridge relative to the system, for nodes that coincide or lie on a conic in the tangent plane
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceInterpolation:
-    """Carries values from P nodes to Q places.
+    """Interpolation weights that carry values from P nodes to Q places."""
 
-    Attributes
-    ----------
-    nodes : (Q, k) array of int
-        Nodes that each place takes its value from.
-    weights : (Q, k) array
-        Share of each of them; a row adds up to one.
-    """
-
-    nodes: np.ndarray
-    weights: np.ndarray
+    nodes: np.ndarray  # (Q, k) int, nodes that each place takes its value from
+    weights: np.ndarray  # (Q, k), share of each of them; a row adds up to one
 
     @classmethod
     def of(

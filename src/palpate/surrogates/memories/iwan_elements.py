@@ -41,7 +41,7 @@ from palpate.surrogates.memories.memory import Amplitude, Carry, Memory, MemoryS
 __all__ = ["IwanElements", "IwanMemento", "IwanState", "advance", "free_step"]
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
-_HALVINGS = 80  # of the search for the free state: to the last bit of any bracket
+_HALVINGS = 80  # halvings in the search for the free state, to the last bit of any bracket
 
 
 @_jit

@@ -25,7 +25,7 @@ from palpate.errors import UsageError
 
 __all__ = ["Patches", "nearest_points"]
 
-FINE = 0.5  # distance of the points that a patch is the mean of, over the patches' spacing
+FINE = 0.5  # distance of the points whose mean a patch is, over the spacing of patches
 LEAST = 0.7  # w₀ over the spacing: narrower patterns jump from patch to patch
 SHARE = 0.45  # w over the radius of a Hertzian contact
 _AT_ONCE = 64  # points whose distances to all others are taken at once

@@ -19,8 +19,8 @@ __all__ = ["advance", "answer", "beta_of", "pattern_into", "step_into", "width_i
 FAR = 18.0  # a patch whose share σ is exp(−18) of the nearest one's, 2e-8, counts as untouched
 ASLEEP = 1e-9  # √J: memory of 1e-18 J is forgotten, so that patches can rest
 SUBSTEP = 0.1  # longest step over the shortest relaxation time; recovery is integrated to first order
-MOST = 64  # substeps
-BEFORE, AFTER, BOTH = 0, 1, 2
+MOST = 64  # substeps of a step, at most
+BEFORE, AFTER, BOTH = 0, 1, 2  # rows of `keeps`
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 

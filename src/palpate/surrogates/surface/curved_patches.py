@@ -15,9 +15,9 @@ from palpate.surrogates.surface.oriented_mesh import CREASE, Corners, OrientedMe
 
 __all__ = ["SMOOTH", "Patches", "patches_of"]
 
-TURN = np.radians(6.0)  # between the normals of a small triangle's corners, at most
-PARTS = 8  # of an edge, at most
-MOST = 60_000  # small triangles
+TURN = np.radians(6.0)  # rad, largest angle between the normals of a small triangle's corners
+PARTS = 8  # parts of an edge, at most
+MOST = 60_000  # small triangles, at most
 SMOOTH, SHARP, END = 0, 1, 2  # kinds of a place: inside a smooth piece, on a crease, on the border
 
 
@@ -25,30 +25,16 @@ SMOOTH, SHARP, END = 0, 1, 2  # kinds of a place: inside a smooth piece, on a cr
 class Patches:
     """Small triangles of a curved surface.
 
-    Attributes
-    ----------
-    corners : (T, 3, 3) array
-        In m.
-    normals : (T, 3, 3) array
-        Outward unit normals of the surface there.
-    places : (T, 7) int array
-        Row of `kinds` and `outward` for inside, edges 0 to 2 and corners 0 to 2 of each triangle.
-    kinds : (f,) int array
-        SMOOTH, SHARP or END; row 0 is SMOOTH.
-    outward : (f, 3) array
-        Mean normal of the triangles that meet there, by which inner and outer side are told apart on creases
-        (Bærentzen & Aanæs 2005, "Signed distance computation using the angle weighted pseudonormal");
-        zero where the surface's own normal is to be taken.
-    border : (b, 2, 3) array
-        Straight parts of the border in m.
+    On creases inner and outer side are told apart by the mean normal `outward` of the triangles that meet there
+    (Bærentzen & Aanæs 2005, "Signed distance computation using the angle weighted pseudonormal").
     """
 
-    corners: np.ndarray
-    normals: np.ndarray
-    places: np.ndarray
-    kinds: np.ndarray
-    outward: np.ndarray
-    border: np.ndarray
+    corners: np.ndarray  # (T, 3, 3), m
+    normals: np.ndarray  # (T, 3, 3), outward unit normals of the surface at the corners
+    places: np.ndarray  # (T, 7) int, rows of `kinds` and `outward` for inside, edges 0 to 2, corners 0 to 2
+    kinds: np.ndarray  # (f,) int, SMOOTH, SHARP or END; row 0 is SMOOTH
+    outward: np.ndarray  # (f, 3), mean normal; zero where the surface's own is to be taken
+    border: np.ndarray  # (b, 2, 3), straight parts of the border, m
 
 
 def patches_of(mesh: OrientedMesh) -> Patches:

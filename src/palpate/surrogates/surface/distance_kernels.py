@@ -114,9 +114,16 @@ def distance_into(
     coefficients: np.ndarray,
     profile: np.ndarray,
 ) -> float:
-    """Signed distance in m at c (3,); fills ∇d (3,) and ∇²d (3, 3) in 1/m.
+    """Signed distance in m; a position that is not finite is infinitely far from the surface.
 
-    A position that is not finite is infinitely far from the surface.
+    Parameters
+    ----------
+    c : (3,)
+        The position, m.
+    gradient, hessian : (3,), (3, 3)
+        Filled with ∇d and with ∇²d in 1/m.
+    frame, coefficients, profile : arrays
+        The surface, from `TouchedSurface.compiled`.
     """
     gradient[:] = 0.0
     hessian[:] = 0.0
@@ -175,6 +182,16 @@ def distances_into(
     coefficients: np.ndarray,
     profile: np.ndarray,
 ) -> None:
-    """Fill distances (N,), gradients (N, 3) and Hessians (N, 3, 3) at places (N, 3)."""
+    """Fill signed distances and their derivatives at many positions.
+
+    Parameters
+    ----------
+    places : (N, 3)
+        The positions, m.
+    distances, gradients, hessians : (N,), (N, 3), (N, 3, 3)
+        Filled with d in m, ∇d and ∇²d in 1/m.
+    frame, coefficients, profile : arrays
+        The surface, from `TouchedSurface.compiled`.
+    """
     for n in range(places.shape[0]):
         distances[n] = distance_into(places[n], gradients[n], hessians[n], frame, coefficients, profile)

@@ -26,49 +26,39 @@ from palpate.surrogates.surface.measured_distance import BEHIND, ROLLED, TURN, M
 
 __all__ = ["DistanceTable", "tabulate"]
 
-SMOOTH, SHARP = 0.4, 0.8  # change of slope from cell to cell
+# change of slope from cell to cell, below which the field is smooth, above which it is sharp
+SMOOTH, SHARP = 0.4, 0.8
 CLEAR = 4  # cells beyond the reach, within which the spline hears of what comes after
 LEVEL = 2  # cells by which the distance rises from there to its level
-COARSE = 4  # every so many nodes the distance is measured where it does not count
+COARSE = 4  # nodes from one measured distance to the next, where distances do not count
 OUTERMOST = 5  # cells at the rim, where nothing changes any more
 PAD = 2  # nodes beyond the spline's own that its coefficients need
 AROUND = 3  # nodes to each side that lend a coefficient their values
-CELLS = 10  # to the radius of the smallest probe, where there are edges to go round
-SOME = 8  # where the border has a shoulder
-FEW = 6  # where there are neither
-TRUE = 1e-3  # of that radius: the error to which the spacing is refined, where there is room
-MOST = 2_000_000  # nodes: 16 MB
+CELLS = 10  # cells in the radius of the smallest probe, where there are edges to go round
+SOME = 8  # cells in that radius, where the border has a shoulder
+FEW = 6  # cells in that radius, where there are neither edges nor a shoulder
+TRUE = 1e-3  # error over that radius, down to which the spacing is refined where there is room
+MOST = 2_000_000  # nodes of the grid, at most: 16 MB
 CHECKS = 20_000  # places at which the error is measured
-COARSEST = 3  # cells to the radius, below which nothing is known of edges
-TRIALS = 3
-PLANE = 1e-9  # of its size: how far a flat surface may lie off its plane
+COARSEST = 3  # cells in the radius, below which nothing is known of edges
+TRIALS = 3  # refinements of the spacing, at most
+PLANE = 1e-9  # share of its size by which a flat surface may lie off its plane
 
 
 @dataclass(frozen=True, eq=False)
 class DistanceTable:
-    """A sampled field, as `palpate.surrogates.surface.distance_kernels` takes it.
+    """A sampled field, as `palpate.surrogates.surface.distance_kernels` takes it."""
 
-    Attributes
-    ----------
-    frame, coefficients, profile : arrays
-        Grid and spline coefficients, and the profile of a flat surface.
-    error : float
-        Largest deviation from the measured distance at check points, in m.
-    """
-
-    frame: np.ndarray
-    coefficients: np.ndarray
-    profile: np.ndarray
-    error: float
+    frame: np.ndarray  # numbers of the grid
+    coefficients: np.ndarray  # spline coefficients on the grid
+    profile: np.ndarray  # profile of a flat surface
+    error: float  # largest deviation from the measured distance at check points, m
 
 
 def tabulate(measured: MeasuredDistance, reach: float, inner: float, spacing: float | None) -> DistanceTable:
     """Return the field out to a reach and in to an inner reach (m), by a spacing (m) or the coarsest that is true.
 
-    Raises
-    ------
-    UsageError
-        If the spacing is too coarse for the probe, or the grid would be too large.
+    A spacing too coarse for the probe is refused, and so is a grid that would be too large.
     """
     ends = measured.patches.kinds.any()
     flat = _is_flat(measured)

@@ -47,19 +47,12 @@ from palpate.surrogates.surface.curved_patches import SHARP, SMOOTH, Patches, pa
 from palpate.surrogates.surface.nearest_triangle import DEEP, disc_tree, nearest_into
 from palpate.surrogates.surface.oriented_mesh import OrientedMesh
 
-__all__ = [
-    "BEHIND",
-    "BRIDGED",
-    "PLAIN",
-    "ROLLED",
-    "ROUNDED",
-    "MeasuredDistance",
-]
+__all__ = ["BEHIND", "BRIDGED", "PLAIN", "ROLLED", "ROUNDED", "MeasuredDistance"]
 
 # the contact point lies on a smooth piece, on a line, or on a border with a shoulder; below the border; behind the body
 PLAIN, ROUNDED, ROLLED, BRIDGED, BEHIND = 0, 1, 2, 3, 4
-TURN = 2.0  # of the radius: how far it takes to turn back behind
-START, FINISH = 0.5, 0.85  # of the radius: where the bridge below the border begins and ends
+TURN = 2.0  # distance over the radius, in which d turns back behind the surface
+START, FINISH = 0.5, 0.85  # distances over the radius, where the bridge below the border begins and ends
 # cosine between distance and normal, below which small triangles are too coarse for the normal
 RESOLVED = 0.98
 
@@ -68,27 +61,13 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 @dataclass(frozen=True, eq=False)
 class MeasuredDistance:
-    """Measures distances to a surface.
+    """The distance to a surface, measured on its patches."""
 
-    Attributes
-    ----------
-    patches : Patches
-        In the order of `discs`.
-    discs : (n, 8) array
-        Their tree.
-    radius : float
-        R in m: of the smallest probe.
-    shoulder : float
-        ρ in m; 0 for none.
-    behind : float
-        In m; infinite where d shall fall on.
-    """
-
-    patches: Patches
-    discs: np.ndarray
-    radius: float
-    shoulder: float = 0.0
-    behind: float = np.inf
+    patches: Patches  # small triangles in the order of `discs`
+    discs: np.ndarray  # (n, 8), tree of the patches
+    radius: float  # R of the smallest probe, m
+    shoulder: float = 0.0  # ρ at the border, m; 0 for none
+    behind: float = np.inf  # distance inside from which d turns back, m; infinite where it falls on
 
     @classmethod
     def of(

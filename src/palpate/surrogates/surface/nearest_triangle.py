@@ -8,7 +8,7 @@ from numba import njit
 __all__ = ["DEEP", "disc_tree", "nearest_into"]
 
 LEAF = 2  # triangles in each smallest disc, at most
-ROUNDING = 1e-9  # by which discs are larger than they need be
+ROUNDING = 1e-9  # share by which discs are larger than they need be
 DEEP = 64  # discs that can wait at a time: two for each level of the tree
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
@@ -138,16 +138,10 @@ def nearest_into(
     weights: np.ndarray,
     trial: np.ndarray,
 ) -> tuple[float, int, int]:
-    """Nearest triangle to a point: square of the distance, its number, and where on it (as `_nearest_point_into`).
+    """Return the nearest triangle to a point: square of the distance, its number, and the place on it.
 
-    Parameters
-    ----------
-    guess : int
-        A triangle that may be near.
-    waiting : (DEEP,) int array
-        Scratch.
-    weights, trial : (3,) arrays
-        The nearest point's weights; scratch.
+    The place is that of `_nearest_point_into`, and `weights` (3,) receives those of the nearest point. `guess` is a
+    triangle that may be near; `waiting` (DEEP,) int and `trial` (3,) are scratch.
     """
     leaves = discs.shape[0] // 2
     best, place = _nearest_point_into(corners, guess, x, y, z, weights)

@@ -16,45 +16,31 @@ import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = [
-    "CREASE",
-    "Corners",
-    "OrientedMesh",
-    "corners_of",
-]
+__all__ = ["CREASE", "Corners", "OrientedMesh", "corners_of"]
 
-CREASE = np.cos(np.radians(40.0))  # facets that turn by more meet in an edge of the body, not in a mesh's
-FLAT = 1e-7  # height of a triangle by its longest edge, below which it has no normal
-SAME = 1e-9  # of the surface's size: points closer than that are one
+# cosine; facets that turn by more meet in an edge of the body, not in one of the mesh
+CREASE = np.cos(np.radians(40.0))
+FLAT = 1e-7  # height over longest edge, below which a triangle has no normal
+SAME = 1e-9  # distance over the surface's size, within which two points are one
 
 
 @dataclass(frozen=True, eq=False)
 class OrientedMesh:
     """An oriented surface, open or closed, in which each edge belongs to one or two triangles.
 
-    Attributes
-    ----------
-    points : (P, 3) array
-        Corners that are used, in m.
-    triangles : (t, 3) int array
-        Counter-clockwise as seen from outside; edge k of a triangle runs from its corner k to the next.
-    neighbours : (t, 3) int array
-        3 times the triangle across each edge, plus the number that the edge has there; -1 at the border.
+    Edge k of a triangle runs from its corner k to the next.
     """
 
-    points: np.ndarray
-    triangles: np.ndarray
-    neighbours: np.ndarray
+    points: np.ndarray  # (P, 3), corners that are used, m
+    triangles: np.ndarray  # (t, 3) int, counter-clockwise as seen from outside
+    neighbours: np.ndarray  # (t, 3) int, 3 × the triangle across each edge + its edge there; -1 at the border
 
     @classmethod
     def of(cls, points: np.ndarray, triangles: np.ndarray) -> OrientedMesh:
-        """Triangles (t, 3) between points (P, 3) in m, of which not all need be used.
+        """Return the surface of triangles (t, 3) between points (P, 3) in m, of which not all need be used.
 
-        Raises
-        ------
-        UsageError
-            If there is no triangle, a corner does not exist or is not finite, a triangle has no area, two
-            points are in one place, an edge has more than two triangles or two that face opposite ways.
+        Refused are meshes without a triangle, with a corner that does not exist or is not finite, a triangle without
+        area, two points in one place, or an edge that has more than two triangles or two that face opposite ways.
         """
         points, triangles = _arrays(points, triangles)
         used, numbers = np.unique(triangles, return_inverse=True)
@@ -159,28 +145,19 @@ def _neighbours(count: int, triangles: np.ndarray) -> np.ndarray:
     return partner.reshape(triangles.shape)
 
 
-TURNS = 3  # of the paraboloid's frame towards the normal that it tells
-UNKNOWNS = 5
-FARTHEST = np.cos(np.radians(30.0))  # a fit that turns the normal by more has not understood the surface
+TURNS = 3  # turns of the paraboloid's frame towards the normal that it finds
+UNKNOWNS = 5  # coefficients of the paraboloid
+# cosine; a fit that turns the normal by more has not understood the surface
+FARTHEST = np.cos(np.radians(30.0))
 
 
 @dataclass(frozen=True, eq=False)
 class Corners:
-    """Normals and smooth pieces at the corners of triangles.
+    """Normals and smooth pieces at the corners of triangles."""
 
-    Attributes
-    ----------
-    normals : (t, 3, 3) array
-        Outward unit normals.
-    sharp : (t, 3) bool array
-        Corners at the end of a smooth piece: on the border or on a crease.
-    pieces : (t, 3) int array
-        Number of the fan of triangles around its vertex to which each corner belongs.
-    """
-
-    normals: np.ndarray
-    sharp: np.ndarray
-    pieces: np.ndarray
+    normals: np.ndarray  # (t, 3, 3), outward unit normals
+    sharp: np.ndarray  # (t, 3) bool, ends of a smooth piece: on the border or on a crease
+    pieces: np.ndarray  # (t, 3) int, number of each corner's fan of triangles around its vertex
 
 
 def corners_of(mesh: OrientedMesh) -> Corners:

@@ -14,7 +14,7 @@ from palpate.surrogates.surface.distance_kernels import distances_into
 
 __all__ = ["TouchedSurface"]
 
-AFTER = 1.0  # of the radius: how much farther inside than `inner` the distance turns back, some cells
+AFTER = 1.0  # distance over the radius, by which the distance turns back farther inside than `inner`
 FLAT_FRAME = 15  # numbers that say where a flat surface lies
 QUANTA = 16  # at least 2^16 quanta to a cell, fewer than 2^17
 

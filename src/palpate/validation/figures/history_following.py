@@ -20,7 +20,7 @@ from palpate.validation.subject import Subject, line_of
 
 __all__ = ["Followed", "HistoryErrors", "follow_unseen", "history_following"]
 
-UNLOADED = 1e-9  # of the largest force: what is less is round-off
+UNLOADED = 1e-9  # share of the largest force, below which a force is round-off
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,10 +30,10 @@ __all__ = [
     "work_of_polygons",
 ]
 
-LOOPS = 100
-BEYOND = 0.3  # of each range of position: how far the loops that cross the border go beyond it
-GRAZING = 1e-6  # of the median energy: loops below hardly touch
-ORDER = 8  # points of the quadrature's rule
+LOOPS = 100  # loops that are drawn at random
+BEYOND = 0.3  # share of each range of position, by which loops across the border go beyond it
+GRAZING = 1e-6  # share of the median energy, below which a loop hardly touches
+ORDER = 8  # points of the rule of quadrature
 FIRST = 32  # intervals of an edge to begin with: a touch shorter than that may be passed over
 LEVELS = 24  # halvings at most: an interval of an edge of 10 mm is then 10 picometres
 TOLERANCE = 1e-13  # disagreement that an interval may keep, over the energy of its loop

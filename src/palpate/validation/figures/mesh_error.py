@@ -19,7 +19,7 @@ __all__ = ["MeshErrors", "mesh_error", "mesh_errors"]
 ASKED = 20
 """Positions from which the mesh's error may be told (the figures above are claimed for both errors together)."""
 
-SAME = 1e-9  # of a range: inputs of the same solve
+SAME = 1e-9  # share of a range, within which inputs are those of the same solve
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,9 @@ __all__ = ["Smoothness", "smoothness", "stroke_smoothness"]
 
 STEP = 1e-4  # m: 0.1 m/s at 1 kHz
 KNOT = 1e-3  # m: spacing of the coarser course
-LEAST = 8  # knots, or finite-element solves, of a stroke
-STROKES = 100
-FLOOR = 1e-9  # of the stroke's largest force: second differences below are rounding
+LEAST = 8  # knots, or finite-element solves, of a stroke, at least
+STROKES = 100  # strokes that are drawn at random
+FLOOR = 1e-9  # share of the stroke's largest force, below which second differences are rounding
 OWN = "the model's own forces at every millimetre, joined by a cubic spline"
 SOLVED = "finite-element solves along the stroke, joined by a cubic spline"
 

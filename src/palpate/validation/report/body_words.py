@@ -15,7 +15,7 @@ __all__ = ["LINEAR", "body_words", "solid_words", "strain_words"]
 LINEAR = 0.05
 """Fibre strain above which hardly any material still follows a linear law."""
 
-_UNNAMED = ("", "linear elastic", "own material")  # names that stand where none was given
+_UNNAMED = ("", "linear elastic", "own material")  # names that stand for a law without a name of its own
 
 
 def body_words(provenance: Mapping[str, Any]) -> str:

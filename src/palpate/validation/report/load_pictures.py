@@ -19,16 +19,7 @@ from palpate.validation.report.network_pictures import (
     units_of,
     with_unit,
 )
-from palpate.validation.report.style import (
-    BLUE,
-    INK,
-    ORANGE,
-    SERIES,
-    Picture,
-    figure,
-    loads_map,
-    picture,
-)
+from palpate.validation.report.style import BLUE, INK, ORANGE, SERIES, Picture, figure, loads_map, picture
 from palpate.validation.unseen_solves import ForceSamples
 
 if TYPE_CHECKING:
@@ -177,9 +168,8 @@ def plot_force(model: Surrogate, data: Dataset, samples: ForceSamples) -> Figure
 
 def _draw_curve(axis: Any, model: Surrogate, samples: ForceSamples) -> None:
     reach, direction = model.energy.inputs[0], model.energy.baseline.directions[0]
-    low = max(
-        reach.low, min(0.0, float(samples.hand.min()))
-    )  # the other side is a mirror image where none was solved
+    # the other side is a mirror image where none was solved
+    low = max(reach.low, min(0.0, float(samples.hand.min())))
     along = np.linspace(low, reach.high, 200)
     force = -model.energy.force(along[:, None]) @ direction
     order = np.argsort(samples.hand[:, 0])

@@ -34,14 +34,13 @@ __all__ = [
 
 AXES = ("x", "y", "z")
 ALONG = 0.9  # cosine from which a direction of the view is called by an axis
-TILT = (
-    0.3  # a view so little off an axis is still drawn with x across: a few contacts on a dome lie on one side
-)
-LINES = 6
-NEAR = 0.02  # of the radius: solves so near to a line lie on it
+# a view so little off an axis is still drawn with x across: a few contacts on a dome lie on one side
+TILT = 0.3
+LINES = 6  # curves that are drawn, at most
+NEAR = 0.02  # distance over the radius, within which a solve lies on a line
 GRID = 61  # places across, for the map of trust
-MARGIN = 0.12  # of the tested part's size, drawn around it
-MARKED = 5
+MARGIN = 0.12  # width of the margin around the tested part, over its size
+MARKED = 5  # worst solves that get a mark
 
 
 def touch_pictures(chapter: Chapter, key: str) -> list[Picture]:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.devices.trace_file import Trace
 from palpate.errors import UsageError
 from palpate.files import writing
 from palpate.format import plain, share
 from palpate.output_files import picture_metadata
-from palpate.runtime.trace_file import Trace
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.style import BLUE, INK, ORANGE, Picture, figure, picture, styled
 from palpate.validation.touch_comparison import TouchComparison
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["comparison_pictures", "plot_comparison", "plot_trace", "save_figure"]
 
-_POINTS = 4000  # of a line: more can't be seen
+_POINTS = 4000  # points of a line; the eye can't tell more
 Solved = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Depths (k,) of solves, m, and the sizes of their forces and of the surrogate's at the same places, N."""
 

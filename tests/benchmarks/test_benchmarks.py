@@ -1,7 +1,8 @@
-"""Each benchmark runs, its tables come out, and what must hold at any size holds."""
+"""Benchmarks run, their tables come out, and what must hold at any size holds."""
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
 import subprocess
@@ -10,13 +11,27 @@ from pathlib import Path
 
 import pytest
 from benchmarks.records import Record
+from benchmarks.runner import BENCHMARKS
 from benchmarks.surrogate_plots import curves
 from benchmarks.surrogate_rivals import RIVALS
 from benchmarks.touch_studies import STUDIES
 
 ROOT = Path(__file__).parents[2]
 
-pytestmark = pytest.mark.full  # all benchmarks run once, for all tests
+pytestmark = pytest.mark.full
+
+# those of which something holds at any size run once, for all tests
+MEASURED = (
+    "cantilever",
+    "latency",
+    "runtime",
+    "surrogates",
+    "sweep",
+    "touching",
+    "touching_cost",
+    "touching_feel",
+    "touching_mesh",
+)
 
 
 def run(*arguments):
@@ -38,7 +53,7 @@ def records(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def quick(records):
-    return json.loads(run("--quick", "--json", "--record", str(records)))
+    return json.loads(run("--quick", "--json", "--record", str(records), "--only", *MEASURED))
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +65,12 @@ def rows(table, **wanted):
     found = [row for row in table["rows"] if all(row[key] == value for key, value in wanted.items())]
     assert found, f"no row with {wanted}"
     return found
+
+
+@pytest.mark.parametrize("name", sorted(set(BENCHMARKS) - set(MEASURED)))
+def test_the_others_are_found(name):
+    """They import what they measure, and are carried out where their tables are renewed."""
+    assert callable(importlib.import_module(f"benchmarks.{name}").tables)
 
 
 def test_machine_is_named_with_versions_and_date(quick):

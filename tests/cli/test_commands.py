@@ -282,17 +282,26 @@ def test_the_double_of_a_library_says_how_it_is_used(palpate, c_compiler, tmp_pa
 
 
 @pytest.mark.full
-def test_demo_runs_both_founding_beams(tmp_path):
-    command = [sys.executable, "-m", "palpate", "demo", "--folder", str(tmp_path / "d"), "--json"]
+def test_demo_runs_a_founding_beam(tmp_path):
+    """In a process of its own; the other beam's solves and networks are measured in `tests/laws`."""
+    command = [
+        sys.executable,
+        "-m",
+        "palpate",
+        "demo",
+        "beam-nylon",
+        "--folder",
+        str(tmp_path / "d"),
+        "--json",
+    ]
     with one_core():
         done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=280)
     assert done.returncode == 0, done.stderr
     content = json.loads(done.stdout)
-    assert set(content["studies"]) == {"beam-copper", "beam-nylon"}
-    assert all(s["passed"] for s in content["studies"].values())
-    assert (tmp_path / "d" / "report.html").stat().st_size < 3_000_000
-    for name in content["studies"]:
-        assert len(Dataset.open(tmp_path / "d" / f"{name}.zarr")) == 501
+    assert set(content["studies"]) == {"beam-nylon"}
+    assert content["studies"]["beam-nylon"]["passed"]
+    assert (tmp_path / "d" / "beam-nylon.html").stat().st_size < 3_000_000
+    assert len(Dataset.open(tmp_path / "d" / "beam-nylon.zarr")) == 501
 
 
 def test_small_study_is_the_one_of_the_fixture(tmp_path):

@@ -44,11 +44,18 @@ def array_api(monkeypatch):
     monkeypatch.setenv("SCIPY_ARRAY_API", "1")
 
 
-# one pass, so that the many small fits of the checks stay quick
 @pytest.mark.usefixtures("array_api")
-@parametrize_with_checks([MRANRegressor(passes=1), RBFNetworkRegressor()])
+@parametrize_with_checks([RBFNetworkRegressor()])
 def test_conventions(estimator, check):
-    if isinstance(estimator, MRANRegressor) and check.func.__name__ in SAME_FIT_AGAIN:
+    check(estimator)
+
+
+# one pass, so that the many small fits of the checks stay quick
+@pytest.mark.full
+@pytest.mark.usefixtures("array_api")
+@parametrize_with_checks([MRANRegressor(passes=1)])
+def test_conventions_of_the_filter(estimator, check):
+    if check.func.__name__ in SAME_FIT_AGAIN:
         # few parameters of ten inputs each
         estimator.set_params(settings="default", form="isotropic", units_max=5)
     check(estimator)

@@ -79,6 +79,7 @@ def test_rotated_bumps_are_not(bump_fit):
     assert relative(found, X_test, Y_test, Y) < 0.5 * cubic_error(X, Y, X_test, Y_test)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("which", ["ridge_fit", "bump_fit"])
 def test_heldout_error_tells_the_test_error_roughly(which, request):
     found, (_, Y, X_test, Y_test) = request.getfixturevalue(which)

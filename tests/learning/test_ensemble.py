@@ -74,6 +74,7 @@ def test_a_mean_answers_what_its_networks_do_on_average(mean):
     np.testing.assert_allclose(answer, np.mean(members, axis=0), rtol=1e-10, atol=1e-12)
 
 
+@pytest.mark.full
 def test_what_a_mean_misses_of_a_solve_left_out_is_the_mean_of_what_its_networks_miss(search, networks, mean):
     problem, found = search.problem, mean(4)
     rows = problem.missed(found.members[0]).rows
@@ -101,12 +102,14 @@ def test_unseen_answers_are_nearer_than_the_networks_on_average(mean):
     assert np.mean((answer - rows["Y"]) ** 2) < np.mean(squares)
 
 
+@pytest.mark.full
 def test_one_network_is_the_best(search, networks, mean):
     found, best = mean(1), min(networks, key=lambda one: alone(search, one))
     assert (found.networks, found.error) == (1, alone(search, best))
     np.testing.assert_array_equal(found.theta, best.network.theta)
 
 
+@pytest.mark.full
 def test_the_second_network_is_that_with_which_the_mean_misses_least(search, networks, mean):
     found = mean(2)
     best = next(one for one in networks if one.network is found.members[0])

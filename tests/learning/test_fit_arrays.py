@@ -314,6 +314,7 @@ def test_declared_inputs_are_matched_to_the_columns_of_their_name(tabular):
         palpate.fit(table.rename(columns={"depth": "d"}), y, inputs=other)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("missing", [None, np.nan, pd.NA])
 def test_a_missing_value_names_its_row_and_column(tabular, missing):
     table = tabular[0].copy().assign(count=np.arange(60)).convert_dtypes()

@@ -146,6 +146,7 @@ def test_all_rows_make_a_better_network_than_some(many):
     assert error < min(error_of_some, 0.01)
 
 
+@pytest.mark.full
 def test_the_error_told_is_that_of_unseen_rows(many):
     fitted, _, y = many
     asked, measured = rows_of(4000, seed=9)

@@ -81,6 +81,7 @@ def test_a_grid_is_split_row_by_row_and_keeps_its_ends_for_training(solved):
     np.testing.assert_allclose(test.X[:, 0], grid.X[1::2, 0])
 
 
+@pytest.mark.full
 def test_a_sobol_design_is_split_at_random_so_that_no_corner_is_left_out(solved):
     _, _, two, sobol = solved
     train, test = split_rows(two, sobol, None)
@@ -92,6 +93,7 @@ def test_a_sobol_design_is_split_at_random_so_that_no_corner_is_left_out(solved)
     assert len({(x > 0, y > 0) for x, y in every_fourth}) < 4  # what this guards against
 
 
+@pytest.mark.full
 def test_random_loads_test_and_never_train(solved):
     s, grid, _, _ = solved
     train, test = split_rows(s, grid, grid.take([0, 1]))
@@ -99,6 +101,7 @@ def test_random_loads_test_and_never_train(solved):
     assert len(train) == 5
 
 
+@pytest.mark.full
 def test_something_must_be_kept_for_testing(solved):
     s, grid, _, _ = solved
     with pytest.raises(UsageError, match="nothing for testing"):
@@ -107,6 +110,7 @@ def test_something_must_be_kept_for_testing(solved):
         )
 
 
+@pytest.mark.full
 def test_datasets_of_different_bodies_are_not_put_together(solved):
     _, grid, _, sobol = solved
     with pytest.raises(UsageError, match="same body"):
@@ -125,12 +129,14 @@ def test_networks_may_do_without_units(solved):
     assert fields == {"nodes": 0, "displacement": 0}
 
 
+@pytest.mark.full
 def test_too_few_solves_are_refused(solved):
     _, grid, _, _ = solved
     with pytest.raises(UsageError, match="too few"):
         learn_bent(grid.take([0, 1, 2]))
 
 
+@pytest.mark.full
 def test_a_coupling_that_holds_nothing_is_refused(solved):
     _, _, _, sobol = solved
     with pytest.raises(UsageError, match="holds nothing"):

@@ -77,7 +77,8 @@ def test_the_modulus_of_theorys_curve_is_recovered_within_a_percent():
     assert hertz_modulus(record, 0.45) == pytest.approx(9e3, rel=0.03)
 
 
-def test_what_an_indentation_can_not_tell_is_refused(solved):
+def test_what_an_indentation_can_not_tell_is_refused():
+    solved = IndentationTest(DEPTHS, [hertz(12e3, 0.45, RADIUS, d) for d in DEPTHS], RADIUS, THICKNESS, WIDTH)
     with pytest.raises(UsageError, match="fitted together"):
         fit(None, [solved, StretchTest("uniaxial", [1, 1.1, 1.2], [0, 1, 2], "nominal")])
     with pytest.raises(UsageError, match="one modulus"):

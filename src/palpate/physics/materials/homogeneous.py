@@ -26,6 +26,7 @@ from palpate.physics.materials.tensors import (
 
 __all__ = [
     "Response",
+    "diagonal",
     "energy_of",
     "equibiaxial",
     "is_incompressible",
@@ -33,6 +34,7 @@ __all__ = [
     "relax_free",
     "simple_shear",
     "uniaxial",
+    "unit_tensors",
     "volumetric",
 ]
 
@@ -144,10 +146,8 @@ def uniaxial(
     (n, …), by default the undeformed body's, `dt` is its length in s, for materials with a history.
     """
     loaded = _amounts(stretch, "stretch")
-    F = _unit(loaded)
-    F[:, 0, 0] = loaded
-    F[:, 1, 1] = F[:, 2, 2] = _side(material, loaded, 1)
-    return _test(material, loaded, F, _LATERAL, (0, 0), state, dt)
+    side = _side(material, loaded, 1)
+    return _test(material, loaded, diagonal(loaded, side, side), _LATERAL, (0, 0), state, dt)
 
 
 def equibiaxial(
@@ -155,9 +155,7 @@ def equibiaxial(
 ) -> Response:
     """Return the stretch λ along the first two axes alike, the third free; arguments as of `uniaxial`."""
     loaded = _amounts(stretch, "stretch")
-    F = _unit(loaded)
-    F[:, 0, 0] = F[:, 1, 1] = loaded
-    F[:, 2, 2] = _side(material, loaded, 2)
+    F = diagonal(loaded, loaded, _side(material, loaded, 2))
     return _test(material, loaded, F, _PLANE, (0, 0), state, dt)
 
 
@@ -166,9 +164,7 @@ def planar(
 ) -> Response:
     """Return the stretch λ along the first axis, none along the second, the third free ("pure shear")."""
     loaded = _amounts(stretch, "stretch")
-    F = _unit(loaded)
-    F[:, 0, 0] = loaded
-    F[:, 2, 2] = np.sqrt(_side(material, loaded, 2))
+    F = diagonal(loaded, np.ones_like(loaded), np.sqrt(_side(material, loaded, 2)))
     return _test(material, loaded, F, _PLANE, (0, 0), state, dt)
 
 
@@ -177,7 +173,7 @@ def simple_shear(
 ) -> Response:
     """Return F = I + γ e₁ ⊗ e₂ for shear strains γ (n,); `state` and `dt` as of `uniaxial`."""
     loaded = _amounts(shear, "shear strain", positive=False)
-    F = _unit(loaded)
+    F = unit_tensors(len(loaded))
     F[:, 0, 1] = loaded
     return _test(material, loaded, F, (), (0, 1), state, dt)
 
@@ -260,8 +256,16 @@ def _amounts(values: ArrayLike, what: str, *, positive: bool = True) -> np.ndarr
     return amounts
 
 
-def _unit(amounts: np.ndarray) -> np.ndarray:
-    return np.tile(np.eye(3), (len(amounts), 1, 1))
+def unit_tensors(count: int) -> np.ndarray:
+    """Return unit tensors (count, 3, 3)."""
+    return np.tile(np.eye(3), (count, 1, 1))
+
+
+def diagonal(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Return the deformation gradients (n, 3, 3) of stretches (n,) along the axes."""
+    F = np.zeros((len(x), 3, 3), dtype=x.dtype)
+    F[:, range(3), range(3)] = np.stack([x, y, z], axis=-1)
+    return F
 
 
 def _side(material: Material, stretch: np.ndarray, loaded: int) -> np.ndarray:

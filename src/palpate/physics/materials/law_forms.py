@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.materials.homogeneous import equibiaxial, is_incompressible, planar, uniaxial
+from palpate.physics.materials.homogeneous import diagonal, equibiaxial, is_incompressible, planar, uniaxial
 from palpate.physics.materials.material import Material
 from palpate.physics.materials.mooney_rivlin import MooneyRivlin
 from palpate.physics.materials.neo_hooke import NeoHookean
@@ -196,12 +196,8 @@ def stress_in_test(material: Material, test: StretchTest, stretch: np.ndarray | 
 
 def _incompressible(mode: str, stretch: np.ndarray) -> np.ndarray:
     """Return F (N, 3, 3) of a test at constant volume."""
-    others = {
-        "uniaxial": (stretch**-0.5, stretch**-0.5),
-        "equibiaxial": (stretch, stretch**-2),
-        "planar": (np.ones_like(stretch), 1 / stretch),
-    }[mode]
-    F = np.zeros((len(stretch), 3, 3), dtype=stretch.dtype)
-    for axis, values in enumerate((stretch, *others)):
-        F[:, axis, axis] = values
-    return F
+    if mode == "uniaxial":
+        return diagonal(stretch, stretch**-0.5, stretch**-0.5)
+    if mode == "equibiaxial":
+        return diagonal(stretch, stretch, stretch**-2)
+    return diagonal(stretch, np.ones_like(stretch), 1 / stretch)

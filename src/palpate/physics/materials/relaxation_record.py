@@ -164,9 +164,8 @@ def _find_ramp(t: np.ndarray, y: np.ndarray, peak: int) -> tuple[float, float, f
     base = float(y[:peak].min())
     top = float(y[peak])
     bottom = int(np.flatnonzero(y[:peak] <= base + _FLAT * (top - base))[-1])
-    flat = bottom >= 2 and t[bottom] - t[0] > 3 * _FLAT * (
-        t[peak] - t[bottom]
-    )  # in a rise it would be shorter
+    # in a rise it would be shorter
+    flat = bottom >= 2 and t[bottom] - t[0] > 3 * _FLAT * (t[peak] - t[bottom])
     base = float(np.median(y[: bottom + 1])) if flat else base
     share = (y - base) / (top - base)
     span = np.arange(bottom + 1, peak)

@@ -28,17 +28,12 @@ DEEPEST = 10  # files that include each other
 MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SUBMODEL")
 SOLID = re.compile(r"D?C3D(\d+)")
 SHELL = re.compile(r"(?:STRI|DS|SFM3D|M3D|R3D|CPS|CPE|CAX|S)(\d+)")
+# kinds of solid elements by their numbers of nodes
 KINDS = {
-    4: "tetra",
-    10: "tetra",
-    8: "hexahedron",
-    20: "hexahedron",
-    27: "hexahedron",
-    6: "wedge",
-    15: "wedge",
-} | {
-    5: "pyramid",
-    13: "pyramid",
+    **dict.fromkeys((4, 10), "tetra"),
+    **dict.fromkeys((8, 20, 27), "hexahedron"),
+    **dict.fromkeys((6, 15), "wedge"),
+    **dict.fromkeys((5, 13), "pyramid"),
 }
 # corners of the faces S1, S2, …
 SIDES = {

@@ -35,9 +35,8 @@ __all__ = ["bodies_apart", "fill_surface", "name_parts", "read_surface"]
 
 LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
 FLAT = 1e-7  # thickness over length below which a surface lies in a plane
-SHARP = (
-    0.05  # weight of a normal's direction against distance over the body's length, where faces are compared
-)
+# weight of a normal's direction against distance over the body's length, where faces are compared
+SHARP = 0.05
 
 
 def read_surface(path: str, unit: str, simplify: float | None = None) -> tuple[Trimesh, Surface]:

@@ -134,14 +134,10 @@ def _close_gaps(surface: Surface) -> Surface:
         moved = float(np.linalg.norm(surface.points - surface.points[node], axis=1).max())
         corners = int((node != np.arange(len(node))).sum())
         return closed.with_note(
-            f"{corners} corners of triangles missed their neighbours by up to {_millimetres(moved)} and were united: "
-            f"{least} edges were open."
+            f"{corners} corners of triangles missed their neighbours by up to {number(1e3 * moved, 2)} mm and were "
+            f"united: {least} edges were open."
         )
     return surface
-
-
-def _millimetres(length: float) -> str:
-    return f"{number(1e3 * length, 2)} mm"
 
 
 def _drop_flat(surface: Surface) -> Surface:

@@ -62,7 +62,7 @@ def held_record(
             fix="Give the begin on the clock of the record: begin= (--begin).",
         )
     length = ramp if ramp is not None else max(start - rise[0], 0.0) if rise else 0.0
-    found = sign * rise[2] if rise and rise[2] is not None and not first else None
+    before = sign * rise[2] if rise and rise[2] is not None and not first else None
     notes = []
     if first:
         notes.append(
@@ -75,9 +75,9 @@ def held_record(
         notes.append(
             f"Found in the record: {' and '.join(words)}. begin= and ramp= (--begin, --ramp) say it otherwise."
         )
-    if preload is None and found:
+    if preload is None and before:
         notes.append(
-            f"Before the rise the response was {number(found)}, a preload: it is subtracted. preload=0 (--preload) "
+            f"Before the rise the response was {number(before)}, a preload: it is subtracted. preload=0 (--preload) "
             "keeps it."
         )
     if not rise and preload is None and begin is not None:
@@ -91,7 +91,7 @@ def held_record(
             f"At {number(time[rows[-1]])} s the response {what}: the hold ends there, and "
             f"{count(len(time) - 1 - int(rows[-1]), 'row')} after it are not fitted."
         )
-    level = preload if preload is not None else found or 0.0
+    level = preload if preload is not None else before or 0.0
     return HeldRecord(time[rows] - start, response[rows] - level, length, tuple(notes))
 
 

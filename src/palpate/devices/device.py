@@ -8,13 +8,15 @@ device", goes through the steps.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar, Protocol, Self
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
 from palpate.devices.device_options import settings_from
+from palpate.devices.profiles import DeviceProfile
 from palpate.errors import DeviceError
 from palpate.network.shared_memory import Block
 
@@ -31,6 +33,7 @@ __all__ = [
     "Traits",
     "free_buttons",
     "quantisation_noise",
+    "time_left",
 ]
 
 HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised device gets zero force
@@ -186,12 +189,19 @@ class Driver:
     settings_kind: ClassVar[type]
     called: ClassVar[str] = "device"
     traits: Traits
+    name = ""  # what an opened device calls itself
     closed = False
 
     @classmethod
     def open(cls, commands: Block, options: Mapping[str, str]) -> Self:
         """Open from texts by option; the address of a service, ``ws://…``, needs no name."""
         return cls(settings_from(cls.settings_kind, options))  # type: ignore[call-arg]
+
+    def limited_traits(self, profile: DeviceProfile, source: str, **own: Any) -> Traits:
+        """Return the kind's traits with the limits of a profile, and before both what is the device's `own`."""
+        limits = ("radius", "max_force", "max_stiffness", "resolution")
+        known = {name: getattr(profile, name) for name in limits} | {"source": source, "name": self.name}
+        return replace(type(self).traits, **(known | own))
 
     def check_open(self) -> None:
         """Refuse the use of a device that is closed."""
@@ -222,6 +232,13 @@ class ScriptedHand(Driver):
         """Let go."""
         self.sent[:] = 0.0
         self.sample.holding = False
+
+
+def time_left(seconds: float) -> Iterator[float]:
+    """Yield the time that is left, s, until so many seconds are over."""
+    end = time.monotonic() + seconds
+    while (left := end - time.monotonic()) > 0.0:
+        yield left
 
 
 def free_buttons(pressed: int, own: int) -> int:

@@ -263,19 +263,9 @@ class ForceDimensionDevice(Driver):
             raise DeviceError(
                 f"{self.name} allows no force.", fix="Raise its limit in the vendor's own program."
             )
-        self.traits = Traits(
-            self.profile.radius,
-            force,
-            ASSUMED_DAMPING,
-            f"{self.profile.name}: {self.profile.source}"
-            f"{'; force: the device itself' if force < self.profile.max_force else ''}; {UNPUBLISHED}",
-            delay=_DELAY,
-            axes=AXES,
-            resolution=self.profile.resolution,
-            max_stiffness=self.profile.max_stiffness,
-            buttons=_BUTTONS,
-            name=self.name,
-        )
+        own_word = "; force: the device itself" if force < self.profile.max_force else ""
+        source = f"{self.profile.name}: {self.profile.source}{own_word}; {UNPUBLISHED}"
+        self.traits = self.limited_traits(self.profile, source, max_force=force)
 
     def _home(self) -> None:
         """Refuse a device whose encoders count from anywhere, or let it home itself where that was asked for."""

@@ -355,10 +355,10 @@ def test_elements_of_another_number_and_a_jump_are_refused():
     ("most", "new", "words"),
     [
         ("MAX_INPUTS", spring_beam, "inputs; the runtime carries 0"),
-        ("MAX_PLACES", lambda: pressed.surrogate(memory=YIELDS), "4 places with an indentation; the runtime carries 0"),
+        (
             "MAX_PLACES",
             lambda: pressed.surrogate(memory=YIELDS),
-            "has 4 places with an indentation; the runtime carries 0",
+            "4 places with an indentation; the runtime carries 0",
         ),
     ],
 )

@@ -60,8 +60,8 @@ _GRAVITY, _LOCK, _UNLOCK, _LOCKED = (
 )
 _ECHOES = 20  # messages, of whose round trips the median counts
 _RESOLUTION = 6e-5  # m: none is published, the coarsest of all devices is taken
-# poses at the start that are checked and thrown away: no faster than this, m/s, nor farther from the first one, m
-_FIRST, _FASTEST, _REACH = 50, 1.0, 0.3
+# poses at the start that are checked and thrown away, of which none is farther from the first one, m
+_FIRST, _REACH = 50, 0.3
 _ASKS = 5  # times that a limp arm is asked to hold its wrist
 _AGAIN = 0.05  # s after which a force is sent again
 _DRIFT = 2e-4  # s/s by which two clocks may run apart: four times what a bad crystal does
@@ -401,7 +401,7 @@ class CrtkDevice(Driver):
                     self._ask_for_wrist(held)
             if seen >= _FIRST:
                 break
-        self._check_start(first, seen)
+        self._check_first(first, seen)
         self._send("unsubscribe", self._twist)
         if self._settings.origin == "here":
             self._origin[:] = self._place
@@ -417,7 +417,7 @@ class CrtkDevice(Driver):
         if self._settings.lock and not self.locked and abs(size - 1.0) < _ROUNDING:
             self._send("publish", _LOCK, msg=dict(orientation))
 
-    def _check_start(self, first: np.ndarray | None, seen: int) -> None:
+    def _check_first(self, first: np.ndarray | None, seen: int) -> None:
         if self._complaint:
             raise DeviceError(
                 "The ROS bridge complains.",
@@ -429,13 +429,7 @@ class CrtkDevice(Driver):
                 f"{self.name} sent {seen} positions within {self._settings.search:g} s.",
                 fix=f"It must send {_FIRST} in that time; 200 a second or more are right for touch.",
             )
-        way, speed = math.dist(self._place, first), math.hypot(*self._velocity)
-        if not (way <= _REACH and speed <= _FASTEST):
-            raise DeviceError(
-                f"{self.name} starts with {speed:.3g} m/s and moved by {way:.3g} m.",
-                why=f"A start is slower than {_FASTEST:g} m/s and within {_REACH:g} m.",
-                fix="Hold it still while it is opened.",
-            )
+        self.check_start(math.dist(self._place, first), math.hypot(*self._velocity), _REACH)
 
 
 def _vector(value: Any) -> list[float]:

@@ -39,6 +39,7 @@ __all__ = [
 HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised device gets zero force
 Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 ASSUMED_DAMPING = 0.5  # N·s/m, of a device whose maker publishes none
+_FASTEST_START = 1.0  # m/s
 UNPUBLISHED = f"damping: none is published, {ASSUMED_DAMPING:g} N·s/m is assumed"
 PLAIN_AXES: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -207,6 +208,17 @@ class Driver:
         """Refuse the use of a device that is closed."""
         if self.closed:
             raise DeviceError(f"The {self.called} is closed.", fix="Open it again.")
+
+    def check_start(
+        self, far: float, speed: float, reach: float, fix: str = "Hold it still while it is opened."
+    ) -> None:
+        """Refuse a start farther from the centre than `reach`, m, or faster than that of a hand that is still."""
+        if not (far <= reach and speed <= _FASTEST_START):
+            raise DeviceError(
+                f"{self.name} starts {far:.3g} m from its centre with {speed:.3g} m/s.",
+                why=f"A start is within {reach:.3g} m and slower than {_FASTEST_START:g} m/s.",
+                fix=fix,
+            )
 
     def components(self, force: np.ndarray) -> tuple[float, float, float, float]:
         """Return x, y, z and size of a force (3,), N, for a device that is open; one that isn't finite is refused."""

@@ -42,7 +42,7 @@ _PRESET = "arm_front_centered"  # the origin in the middle of the reach
 _GOODBYE = 0.05  # s for each of the two answers that may be outstanding at the end
 _LOST = 0.010  # s after which an answer counts as lost
 _PROOF, _PROVING_FORCE = 50, 0.05  # commands of more than that many N until an echo is missed
-_FIRST, _FASTEST = 50, 1.0  # samples at the start that are checked and thrown away; faster is an error, m/s
+_FIRST = 50  # samples at the start that are checked and thrown away
 _REACH, _IMPOSSIBLE = 0.5, 3  # m from the centre that no arm reaches; samples in a row until that is an error
 _BUTTONS = 4  # of the grip that has the most
 _NEEDED = ("power_supply", "calibrated", "ready")
@@ -397,12 +397,8 @@ class HaplyDevice(Driver):
                 state = entry.get("state") or {}
                 place = haply_frames.read_vector(state, "cursor_position", math.nan)
                 speed = haply_frames.read_vector(state, "cursor_velocity", 0.0)
-                if not (math.hypot(*place) <= _REACH and math.hypot(*speed) <= _FASTEST):
-                    raise DeviceError(
-                        f"Haply device {self.device_id} starts at {place} m with {speed} m/s.",
-                        why=f"A start is within {_REACH:g} m of the centre and slower than {_FASTEST:g} m/s.",
-                        fix="Calibrate it in the Haply Hub, and hold it still while it is opened.",
-                    )
+                fix = "Calibrate it in the Haply Hub, and hold it still while it is opened."
+                self.check_start(math.hypot(*place), math.hypot(*speed), _REACH, fix)
                 self._take(entry)
         preset = (entry.get("config") or {}).get("preset", "")
         if preset not in {"", _PRESET}:

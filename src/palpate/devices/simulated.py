@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numba import njit
@@ -21,7 +20,7 @@ from numba import njit
 from palpate.devices.device import Driver, Sample, Traits
 from palpate.devices.device_options import DeviceOptions, number, word
 from palpate.devices.profiles import device_profile
-from palpate.errors import UsageError
+from palpate.devices.trace_file import read_stroke
 
 __all__ = ["SimulatedHand", "SimulatedSettings"]
 
@@ -163,11 +162,7 @@ class SimulatedHand(Driver):
 
 def _recorded_path(file: str) -> np.ndarray:
     """Return times, s from the first, and places, m, of a recorded hand (N, 4)."""
-    from palpate.devices.trace_file import read_trace  # which needs the table of devices
-
-    trace = read_trace(Path(file))
-    if len(trace) < 2:
-        raise UsageError(f"{file} holds no stroke.", fix="Record a longer touch.")
+    trace = read_stroke(file)
     return np.column_stack([trace.time - trace.time[0], trace.ticks["hand"]])
 
 

@@ -356,11 +356,15 @@ def test_elements_of_another_number_and_a_jump_are_refused():
     ("most", "new", "words"),
     [
         ("MAX_INPUTS", spring_beam, "inputs; the runtime carries 0"),
-        ("MAX_PLACES", lambda: pressed.surrogate(memory=YIELDS), "at 4 places; the runtime carries 0"),
+        (
+            "MAX_PLACES",
+            lambda: pressed.surrogate(memory=YIELDS),
+            "4 places with an indentation; the runtime carries 0",
+        ),
     ],
 )
 def test_a_surrogate_too_large_for_the_runtime_is_refused_by_what_is_too_large(most, new, words, monkeypatch):
-    monkeypatch.setattr(f"palpate.runtime.swap.{most}", 0)
+    monkeypatch.setattr(f"palpate.runtime.shared_state.{most}", 0)
     with pytest.raises(UsageError, match=words) as raised:
         swap_between(touchable(new()), touchable(new()))
     assert raised.value.why

@@ -24,7 +24,7 @@ CARRIED_BY_PROSE = 3  # arguments of an exported function that a sentence can na
 REFERRED_TO = {("palpate.physics.renderer", "plot_solution")}
 # Exported records whose fields have their text and unit where they are declared.
 DECLARED = {
-    "State": "the table STATE, from which the shared memory is laid out, has a unit and a text for each",
+    "State": "each field's unit stands beside it, where the shared memory's layout is declared",
     "Study": "each record's fields have them, and the study file's reference is made from these",
 }
 PACKAGES = sorted({package_of(file) for file in files()})

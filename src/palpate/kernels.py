@@ -35,9 +35,8 @@ MANY = 100_000
 
 # `fastmath` stays off, so that all ways agree to the last bit
 _OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False}
-_REFUSES = ctypes.cast(
-    ctypes.pythonapi.PyObject_Call, ctypes.c_void_p
-).value  # of an object that can't be called
+# address of the C code of an object that can't be called
+_REFUSES = ctypes.cast(ctypes.pythonapi.PyObject_Call, ctypes.c_void_p).value
 
 
 _asked: Counter[Any] = Counter()  # rows, of kernels that were not compiled
@@ -138,10 +137,8 @@ def for_rows(compiled: Any, rows: int, one: Any = None) -> Callable[..., Any]:
         try:
             with np.errstate(all="ignore"):
                 return interpreted(compiled)(*arguments)
-        except (
-            ArithmeticError,
-            ValueError,
-        ):  # what Python refuses and a processor answers by ∞ or not-a-number
+        except (ArithmeticError, ValueError):
+            # Python refuses what a processor answers by ∞ or not-a-number
             return compiled(*arguments)
 
     return interpret

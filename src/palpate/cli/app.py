@@ -1,7 +1,4 @@
-"""Commands of the command line. Each one reads its arguments, calls the work, and prints the result.
-
-Heavy packages are imported only by the command that needs them.
-"""
+"""Commands of the command line: each reads arguments, imports the heavy packages it needs, and prints the result."""
 
 from __future__ import annotations
 

@@ -17,10 +17,10 @@ _Settings = TypeVar("_Settings")
 
 @dataclass(frozen=True)
 class _Allowed:
-    """What an option may be."""
+    """The values that an option may have."""
 
-    holds: Callable[[Any], bool]
-    words: str
+    holds: Callable[[Any], bool]  # whether a value is one of them
+    words: str  # for the message that refuses others
 
 
 def number(

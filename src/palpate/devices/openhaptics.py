@@ -286,9 +286,8 @@ class OpenHapticsDevice(Driver):
             raise self._failure()
         if (frames := self._box.read(self._place)[0]) < servo.FIRST:
             raise DeviceError(f"{self.name} gave {frames} positions in {_START:g} s.", fix="Start it again.")
-        for *place, u, v, w in self._box.early()[
-            servo.FIRST // 2 :
-        ].tolist():  # several drivers deliver garbage at first
+        # several drivers deliver garbage at first
+        for *place, u, v, w in self._box.early()[servo.FIRST // 2 :].tolist():
             far = math.hypot(*(p * _MM - c for p, c in zip(place, self._centre, strict=True)))
             speed = math.hypot(u, v, w) * _MM
             fix = "Calibrate it, and hold it still while it is opened."

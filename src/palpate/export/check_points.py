@@ -117,9 +117,8 @@ class ExportedFile:
 
     file: Path
     hash: str  # SHA-256 of the weights, as in every other export of the body
-    comparison: (
-        Comparison | None
-    )  # None where the program that runs it is missing, or nothing was to be compared
+    # None where the program that runs it is missing, or nothing was to be compared
+    comparison: Comparison | None
 
     def as_dict(self) -> dict[str, Any]:
         """Return what was written and compared, for JSON."""

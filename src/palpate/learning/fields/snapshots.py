@@ -90,13 +90,7 @@ class Solves:
 
     @property
     def touching(self) -> Solves:
-        """Those in contact.
-
-        Raises
-        ------
-        UsageError
-            If none is.
-        """
+        """Return those in contact; solves of which none is are refused."""
         deep = self.depth > 0
         if not deep.any():
             raise UsageError(

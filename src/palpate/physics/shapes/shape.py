@@ -251,21 +251,11 @@ def _plain(shape: Hashable, refinements: tuple[FineMesh, ...]) -> BodyMesh:
 
 @dataclass(frozen=True, eq=False)
 class Isometry:
-    """A rotation or reflection M about a point p: a place X goes to p + M (X − p).
+    """A rotation or reflection M about a point p: a place X goes to p + M (X − p)."""
 
-    Attributes
-    ----------
-    matrix : (3, 3) array
-        Orthogonal matrix M.
-    about : (3,) array
-        Point p, m.
-    goes : mapping of surface to surface
-        Name of the surface onto which each goes; those not named stay where they are.
-    """
-
-    matrix: np.ndarray
-    about: np.ndarray
-    goes: Mapping[str, str] = field(default_factory=dict)
+    matrix: np.ndarray  # (3, 3), orthogonal matrix M
+    about: np.ndarray  # (3,), point p, m
+    goes: Mapping[str, str] = field(default_factory=dict)  # surface onto which each goes; others stay
 
     def surface(self, name: str) -> str:
         """The surface on which that of this name comes to lie."""

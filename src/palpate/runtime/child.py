@@ -27,7 +27,7 @@ from palpate.runtime.replay import is_recorded_model, loop_facts, play
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.swap_desk import SwapDesk
-from palpate.runtime.touchable import load_touchable
+from palpate.runtime.touchable import aim_device, load_touchable
 from palpate.runtime.trace_file import read_trace
 
 __all__ = ["FOREIGN", "main"]
@@ -63,6 +63,7 @@ def _parser() -> argparse.ArgumentParser:
         "--unsoftened", action="store_true", help="a body too stiff for the device feels so all the same"
     )
     parser.add_argument("--no-controller", action="store_true", help="the passivity controller only counts")
+    parser.add_argument("--aim", action="store_true", help="a stroke presses where the body was trained")
     parser.add_argument(
         "--dead-man", action="store_true", help="force only while the device's first button is held"
     )
@@ -83,6 +84,8 @@ def _run(options: argparse.Namespace) -> int:
         trace = read_trace(options.replay)
         play(trace, model, shared, orphaned, same=is_recorded_model(trace, options.model))
         return 0
+    if options.aim:
+        options.device = aim_device(options.device, model)
     recorder = None
     if options.ring:
         ring = Ring.attach(options.ring)
@@ -110,7 +113,7 @@ def _run(options: argparse.Namespace) -> int:
     )
     loop.out.device(traits.name or options.device.partition(":")[0])
     if recorder is not None:
-        recorder.ring.describe(loop_facts(model, loop, limits))
+        recorder.ring.describe(loop_facts(model, loop, limits) | {"device": options.device})
         recorder.begin(loop)
     _say({"obtained": obtain(), "device_note": _note(device)})
     rehearsal = Rehearsal(model, workspace, limits, options.rate)

@@ -74,6 +74,8 @@ class LoopProcess:
         New file that takes every tick from the first on; see `start_recording`.
     replay : path, optional
         Recorded touch that is gone through instead of a device, at the pace at which it was recorded.
+    aim : bool
+        Whether a scripted stroke without a place presses where the body was trained to be pressed.
 
     Raises
     ------
@@ -98,6 +100,7 @@ class LoopProcess:
         parameters: Sequence[float] = (),
         record: str | os.PathLike[str] | None = None,
         replay: str | os.PathLike[str] | None = None,
+        aim: bool = False,
     ) -> None:
         traits = device_traits(device)
         if dead_man and not traits.buttons:
@@ -121,6 +124,8 @@ class LoopProcess:
             self._arguments.append("--no-controller")
         if dead_man:
             self._arguments.append("--dead-man")
+        if aim:
+            self._arguments.append("--aim")
         if replay is not None:
             self._arguments.append(f"--replay={os.fspath(replay)}")
         self._model, self._record, self._replayed = model, record, replay is not None

@@ -384,7 +384,7 @@ def second_order_into(x, g, H, grams, work, steps, layout, scales, units, rows, 
     q, n, h = g.size, x.size, units.shape[1]
     line, _ = _places(work, layout, scales, units)
     _regress(x, line, work, steps, layout, scales, units, constants, 1)
-    combine(work[line], rows, g[:1])
+    _few(work[line], rows, g[:1])  # as `combine` does for one output
     value = g[0]
     _pulled(line, q, work, layout, scales, units)
     first = 1 + n

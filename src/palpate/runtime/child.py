@@ -28,7 +28,7 @@ from palpate.runtime.replay import is_recorded_model, loop_facts, play
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.swap_desk import SwapDesk
-from palpate.runtime.touchable import load_touchable
+from palpate.runtime.touchable import aim_device, load_touchable
 
 __all__ = ["FOREIGN", "main"]
 
@@ -60,6 +60,8 @@ def _run(options: SimpleNamespace) -> int:
         trace = read_trace(options.replay)
         play(trace, model, shared, orphaned, same=is_recorded_model(trace, options.model))
         return 0
+    if options.aim:
+        options.device = aim_device(options.device, model)
     recorder = None
     if options.ring:
         ring = Ring.attach(options.ring)
@@ -87,7 +89,7 @@ def _run(options: SimpleNamespace) -> int:
     )
     loop.out.device(traits.name or options.device.partition(":")[0])
     if recorder is not None:
-        recorder.ring.describe(loop_facts(model, loop, limits))
+        recorder.ring.describe(loop_facts(model, loop, limits) | {"device": options.device})
         recorder.begin(loop)
     _say({"obtained": obtain(), "device_note": _note(device)})
     rehearsal = Rehearsal(model, workspace, limits, options.rate)

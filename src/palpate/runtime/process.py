@@ -73,6 +73,8 @@ class LoopProcess:
         New file that takes every tick from the first on; see `start_recording`.
     replay : path, optional
         Recorded touch that is gone through instead of a device, at the pace at which it was recorded.
+    aim : bool
+        Whether a scripted stroke without a place presses where the body was trained to be pressed.
 
     Raises
     ------
@@ -97,6 +99,7 @@ class LoopProcess:
         parameters: Sequence[float] = (),
         record: str | os.PathLike[str] | None = None,
         replay: str | os.PathLike[str] | None = None,
+        aim: bool = False,
     ) -> None:
         traits = device_traits(device)
         if dead_man and not traits.buttons:
@@ -116,6 +119,7 @@ class LoopProcess:
             "unsoftened": unsoftened,
             "control": controller,
             "dead_man": dead_man,
+            "aim": aim,
             "replay": "" if replay is None else os.fspath(replay),
         }
         self._model, self._record, self._replayed = model, record, replay is not None

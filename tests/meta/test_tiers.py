@@ -40,12 +40,13 @@ def test_every_folder_has_tests_in_a_plain_run(folder: Path):
 
 # real parts, and the files that go through them in a plain run
 REAL_PARTS = {
+    "bodies of each kind": "cli/test_each_kind.py",
     "Zarr": "dataset/test_dataset.py",
     "workers": "sweeps/test_sweep.py",
     "websockets": "viewer/test_traffic.py",
     "Chromium": "viewer/test_page.py",
     "compiled C": "export/test_export_checklist.py",
-    "devices": "runtime/test_device_checklist.py",
+    "devices": "devices/test_device_checklist.py",
 }
 
 

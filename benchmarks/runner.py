@@ -22,6 +22,7 @@ __all__ = ["BENCHMARKS", "Benchmark", "main"]
 BENCHMARKS = (
     "active_choice",
     "cantilever",
+    "cold_start",
     "device_round_trips",
     "export_speed",
     "faults",

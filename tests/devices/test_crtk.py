@@ -5,142 +5,60 @@ from __future__ import annotations
 import json
 import math
 import select
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs import TICK, CrtkRig
 
-from palpate.devices import crtk, device_named, device_traits
+from palpate.devices import crtk, device_traits
 from palpate.devices.crtk import CrtkDevice
 from palpate.devices.crtk_settings import CrtkSettings, axes_in_words
-from palpate.devices.device import HARDWARE_PATIENCE
 from palpate.devices.doubles.crtk_simulator import CrtkSimulator, CrtkSimulatorSettings
 from palpate.devices.websocket_channel import WebsocketChannel
 from palpate.errors import DeviceError, DeviceLostError, PortInUseError, UsageError
 from palpate.runtime import Fault, Workspace
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Limits
+from waiting import wait_for
 
 FRAMES = json.loads((Path(__file__).parents[1] / "data/devices/crtk.json").read_text(encoding="utf-8"))
 pytestmark = pytest.mark.timeout(240)
-TICK = 1e-3
-
-
-class Clock:
-    """The arm's clock: it goes on by itself while a driver opens, and stands still until it is moved after that.
-
-    The loop's clock is another, an hour behind.
-    """
-
-    time, running = 5000.0, True
-
-    @property
-    def loop(self):
-        return self.time - 3600.0
-
-    def __call__(self):
-        self.time += TICK if self.running else 0.0
-        return self.time
 
 
 @pytest.fixture
-def clock():
-    return Clock()
-
-
-def serve(clock, **settings):
-    return CrtkSimulator(CrtkSimulatorSettings(port=0, **settings), clock)
-
-
-@pytest.fixture
-def service(clock):
-    with serve(clock) as simulator:
-        yield simulator
-
-
-def connect(service, **settings):
-    usual = {"arm": "arm", "delay": 0.0, "search": 10.0}
-    service.stream(True)
-    service.clock.running = True
-    device = CrtkDevice(CrtkSettings(url=f"ws://127.0.0.1:{service.port}", **(usual | settings)))
-    service.stream(False)
-    service.clock.running = False
-    leave_unread(device)
-    return device
-
-
-def leave_unread(device):
-    """Pass over what the arm has streamed while nobody read it."""
-    while device._channel.receive(0.0):
-        pass
-
-
-@pytest.fixture
-def device(service):
-    driver = connect(service)
-    yield driver
-    driver.close()
-
-
-def drive(device, service, ticks, force=(0.0, 0.0, 0.0)):
-    """Positions and their ages of some ticks of an arm and a driver in step."""
-    seen = []
-    for _ in range(ticks):
-        service.clock.time += TICK
-        service.step()
-        sample = device.read(service.clock.loop)
-        seen.append((sample.position.copy(), service.clock.loop - sample.time))
-        device.write(np.array(force))
-        assert service.await_wrenches(device.published)
-    return seen
-
-
-class Rig:
-    """A loop on an arm, in step; the hand begins at rest, since a force begins only there."""
-
-    def __init__(self, service, plain, shared, **settings):
-        self.service = service
-        self.device = connect(service, force=12.0, **settings)
-        self.loop = Loop(plain, self.device, shared, Workspace(0.15, 10.0), Limits(12.0), rate=1000.0)
-
-    def run(self, ticks):
-        seen = []
-        for _ in range(ticks):
-            self.service.clock.time += TICK
-            self.service.step()
-            self.loop.tick(self.service.clock.loop)
-            assert self.service.await_wrenches(self.device.published)
-            seen.append((float(np.linalg.norm(self.loop.safety.force)), self.loop.fault))
-        return seen
-
-    def press(self):
-        """Tick until the force is felt: the hand has passed its place of rest by then, wherever it began."""
-        for _ in range(10):
-            if (last := self.run(30)[-1])[0] > 0.0:
-                return
-        raise AssertionError(last)
-
-
-@pytest.fixture
-def rig(clock, plain, shared):
-    with serve(clock, frequency=4.0, amplitude=0.02) as service:
-        rig = Rig(service, plain, shared)
+def rig():
+    with CrtkRig() as rig:
         yield rig
-        rig.loop.end()
+
+
+@pytest.fixture
+def service(rig):
+    return rig.service
+
+
+@pytest.fixture
+def device(rig):
+    return rig.open(origin="here")
+
+
+@pytest.fixture
+def loop(rig, plain, shared):
+    return rig.loop(plain, shared)
 
 
 @pytest.mark.parametrize("ros", [1, 2])
-def test_both_spellings_of_types_are_found(clock, ros):
-    with serve(clock, ros=ros) as service:
-        device = connect(service)
+def test_both_spellings_of_types_are_found(ros):
+    with CrtkRig(ros=ros) as rig:
+        service = rig.service
+        device = rig.open()
         assert device.types == f"ros{ros}"
         assert service.topics["/arm/body/servo_cf"].count("/") == ros
-        drive(device, service, 3, (0.0, 0.0, 1.0))
+        rig.drive(3, (0.0, 0.0, 1.0))
         np.testing.assert_array_equal(service.force(), [0.0, 0.0, 1.0])
         device.close()
         with pytest.raises(DeviceError, match="Unable to import"):
-            connect(service, types=f"ros{3 - ros}", search=0.5)
+            rig.open(types=f"ros{3 - ros}", search=0.5)
 
 
 def example(topic, ros, side="from_the_arm", value=None):
@@ -159,12 +77,13 @@ def shape(value):
 
 
 @pytest.mark.parametrize("ros", [1, 2])
-def test_example_messages_are_read(clock, ros):
-    with serve(clock, ros=ros, arm="MTMR") as service:
-        device = connect(service, arm="MTMR", origin="base")
+def test_example_messages_are_read(ros):
+    with CrtkRig(ros=ros, arm="MTMR") as rig:
+        service = rig.service
+        device = rig.open(arm="MTMR", origin="base")
         service.publish("/MTMR/operating_state", example("/MTMR/operating_state", ros))
         message = example("/MTMR/measured_cp", ros)
-        now = service.clock.loop
+        now = rig.now
         for delay in (0.0, 0.002):  # the second, 1 s younger by its stamp, came 2 ms later than the first
             service.publish("/MTMR/measured_cp", message)
             sample = read_when_it_comes(device, now + 500.0 * delay + delay)
@@ -196,15 +115,16 @@ def read_when_it_comes(device, now):
 
 
 @pytest.mark.parametrize("ros", [1, 2])
-def test_what_is_sent_has_the_fields_and_types_of_the_example_messages(clock, ros):
-    with serve(clock, ros=ros, arm="MTMR") as service:
+def test_what_is_sent_has_the_fields_and_types_of_the_example_messages(ros):
+    with CrtkRig(ros=ros, arm="MTMR") as rig:
+        service = rig.service
         service.state = "DISABLED"
-        device = connect(service, arm="MTMR", enable=1.0)
+        device = rig.open(arm="MTMR", enable=1.0)
         types = dict(service.topics)
-        drive(device, service, 2, (0.0, 0.0, 1.0))
+        rig.drive(2, (0.0, 0.0, 1.0))
         device.close()
         assert service.await_wrenches(device.published)
-        wait_until(lambda: "/MTMR/unlock_orientation" in service.received)
+        wait_for(lambda: "/MTMR/unlock_orientation" in service.received)
         for frame in (f for f in FRAMES["to_the_arm"] if f["ros"] == ros):
             sent, known = shape(service.received[frame["topic"]]), shape(frame["msg"])
             header, full = sent.pop("header", {}), known.pop("header", {})
@@ -213,17 +133,11 @@ def test_what_is_sent_has_the_fields_and_types_of_the_example_messages(clock, ro
             assert types[frame["topic"]] == frame["type"]
 
 
-def wait_until(done):
-    deadline = time.monotonic() + 10.0
-    while not done():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
-
-
 @pytest.mark.parametrize("ros", [1, 2])
-def test_the_double_writes_what_the_example_messages_have(clock, ros):
+def test_the_double_writes_what_the_example_messages_have(ros):
     """Its messages, and none of the driver's, are compared: the double learns nothing from what it feeds."""
-    with serve(clock, ros=ros, arm="MTMR") as service:
+    with CrtkRig(ros=ros, arm="MTMR") as rig:
+        service = rig.service
         told = {}
         channel = WebsocketChannel(f"ws://127.0.0.1:{service.port}", "ROS bridge")
         frames = [f for f in FRAMES["from_the_arm"] if f["ros"] == ros]
@@ -231,8 +145,7 @@ def test_the_double_writes_what_the_example_messages_have(clock, ros):
             channel.send(json.dumps({"op": "subscribe", "topic": frame["topic"], "type": frame["type"]}))
         for pedal in {f["topic"] for f in frames if f["type"].endswith("Joy")}:
             service.press(pedal, 1)
-        deadline = time.monotonic() + 10.0
-        while len(told) < len({f["topic"] for f in frames}) and time.monotonic() < deadline:
+        while len(told) < len({f["topic"] for f in frames}):
             for text in channel.receive(0.1):
                 message = json.loads(text)
                 assert message["op"] == "publish", message
@@ -241,28 +154,28 @@ def test_the_double_writes_what_the_example_messages_have(clock, ros):
         assert told == {f["topic"]: shape(f["msg"]) for f in frames}
 
 
-def test_a_limp_arm_bears_its_weight_and_holds_its_wrist(service, device):
+def test_a_limp_arm_bears_its_weight_and_holds_its_wrist(service, device, rig):
     """As the maker's own example begins: gravity compensation, the base's axes, no force, and the wrist as it is."""
     assert (service.gravity, service.absolute, service.limp) == (True, True, True)
-    wait_until(lambda: device.locked or drive(device, service, 1) is None)
+    wait_for(lambda: device.locked or rig.drive(1) is None)
     assert service.locked == pytest.approx({"x": 0.0, "y": 0.0, "z": math.sqrt(0.5), "w": math.sqrt(0.5)})
     assert device.note == ""
-    drive(device, service, 3, (1.0, 2.0, 3.0))
+    rig.drive(3, (1.0, 2.0, 3.0))
     np.testing.assert_array_equal(service.force(), [1.0, 2.0, 3.0])
     device.close()
-    wait_until(lambda: service.locked is None)
+    wait_for(lambda: service.locked is None)
     assert service.gravity, "an arm that is let go must not fall"
 
 
-def test_gravity_and_wrist_are_left_alone_where_that_is_asked_for(service):
-    device = connect(service, gravity=0.0, lock=0.0)
-    drive(device, service, 3)
+def test_gravity_and_wrist_are_left_alone_where_that_is_asked_for(service, rig):
+    device = rig.open(gravity=0.0, lock=0.0)
+    rig.drive(3)
     assert (service.gravity, service.locked) == (False, None)
     np.testing.assert_array_equal(service.force(), [0.0, 0.0, -service.settings.weight])
     device.close()
 
 
-def test_an_arm_that_was_restarted_is_asked_for_all_again(rig):
+def test_an_arm_that_was_restarted_is_asked_for_all_again(rig, loop):
     """Else it would sink, its wrist swing, and a force in its own axes push in another direction."""
     service = rig.service
     rig.run(60)
@@ -271,95 +184,84 @@ def test_an_arm_that_was_restarted_is_asked_for_all_again(rig):
     service.absolute, service.gravity = False, False
     service.state = "ENABLED"
     assert rig.run(30)[-1][1] is Fault.NONE
-    wait_until(lambda: service.locked is not None)
+    wait_for(lambda: service.locked is not None)
     assert (service.absolute, service.gravity, service.limp) == (True, True, True)
 
 
-def test_a_wrist_that_swings_again_is_told(service, device):
-    drive(device, service, 2)
+def test_a_wrist_that_swings_again_is_told(service, device, rig):
+    rig.drive(2)
     service.publish("/arm/orientation_locked", {"data": False})
-    wait_until(lambda: device.locked is False or drive(device, service, 1) is None)
+    wait_for(lambda: device.locked is False or rig.drive(1) is None)
     assert device.note == "its wrist does not hold its orientation"
 
 
-def test_an_arm_that_could_not_be_opened_was_not_made_limp(service):
+def test_an_arm_that_could_not_be_opened_was_not_made_limp(service, rig):
     service.state = "DISABLED"
     with pytest.raises(DeviceError, match="motors are off"):
-        connect(service)
+        rig.open()
     assert (service.limp, service.wrenches) == (False, 0)
     service.state, service.faults.runaway = "ENABLED", 0.01
     with pytest.raises(DeviceError, match="Hold it still"):
-        connect(service)
-    wait_until(lambda: "/arm/unlock_orientation" in service.received)
+        rig.open()
+    wait_for(lambda: "/arm/unlock_orientation" in service.received)
     assert service.locked is None, "the wrist is free again"
 
 
-def pedal_sample(device, service, pedal, value):
-    service.press(pedal, value)
-    drive(device, service, 1)
-    return device.sample
+def pedal_sample(rig, pedal, value):
+    rig.service.press(pedal, value)
+    rig.drive(1)
+    return rig.device.sample
 
 
-def test_pedals_clutch_stop_and_are_dead_man(service):
+def test_pedals_clutch_stop_and_are_dead_man(service, rig):
     service.press("footpedals/clutch", 1)  # before it is opened
-    device = connect(service)
+    device = rig.open()
     assert device.traits.buttons == 5
-    sample = pedal_sample(device, service, "footpedals/cam_plus", 0)
+    sample = pedal_sample(rig, "footpedals/cam_plus", 0)
     assert (sample.clutched, sample.holding, sample.buttons) == (True, True, 0)
-    assert not pedal_sample(device, service, "footpedals/clutch", 0).clutched
-    assert pedal_sample(device, service, "footpedals/coag", 1).buttons == 1, "the dead-man pedal is the first"
+    assert not pedal_sample(rig, "footpedals/clutch", 0).clutched
+    assert pedal_sample(rig, "footpedals/coag", 1).buttons == 1, "the dead-man pedal is the first"
     others = ("bicoag", "camera", "cam_minus", "cam_plus")
     for k, pedal in enumerate(others, start=1):
-        assert pedal_sample(device, service, f"footpedals/{pedal}", 1).buttons == 1 | 1 << k
-        assert pedal_sample(device, service, f"footpedals/{pedal}", 0).buttons == 1
-    assert pedal_sample(device, service, "footpedals/coag", 2).buttons == 0, "a tap holds nothing"
+        assert pedal_sample(rig, f"footpedals/{pedal}", 1).buttons == 1 | 1 << k
+        assert pedal_sample(rig, f"footpedals/{pedal}", 0).buttons == 1
+    assert pedal_sample(rig, "footpedals/coag", 2).buttons == 0, "a tap holds nothing"
     service.press("footpedals/camera", 2)
-    wait_until(lambda: drive(device, service, 1) and device.sample.buttons == 0b100)
-    drive(device, service, 1)
+    wait_for(lambda: rig.drive(1) and device.sample.buttons == 0b100)
+    rig.drive(1)
     assert device.sample.buttons == 0, "a tap is one sample long: it stops, and a person resumes"
     device.close()
 
 
-def test_pedals_stop_the_force_of_a_loop_and_release_it(rig):
-    rig.press()
-    rig.service.press("footpedals/camera", 2)
-    seen = rig.run(30)
-    assert seen[-1] == (0.0, Fault.NONE)
-    assert rig.loop.stop.stopped
-    np.testing.assert_array_equal(rig.service.force(), np.zeros(3))
-
-
-def test_other_pedals_and_consoles(service):
-    device = connect(
-        service, hold="console1/operator_present", dead_man="", clutch="camera", pedals="a/footpedals"
-    )
+def test_other_pedals_and_consoles(service, rig):
+    device = rig.open(hold="console1/operator_present", dead_man="", clutch="camera", pedals="a/footpedals")
     assert (device.traits.buttons, device_traits("crtk").buttons) == (0, 5)
     assert device_traits("crtk:dead_man=").buttons == 0
     assert device_traits("crtk:hold=coag,dead_man=bicoag").buttons == 4
-    drive(device, service, 1)
+    rig.drive(1)
     assert not device.sample.holding, "an operator who was not seen is not there"
-    assert pedal_sample(device, service, "console1/operator_present", 1).holding
-    assert pedal_sample(device, service, "a/footpedals/camera", 1).clutched
-    assert pedal_sample(device, service, "a/footpedals/clutch", 1).buttons == 0b10, "any other button stops"
+    assert pedal_sample(rig, "console1/operator_present", 1).holding
+    assert pedal_sample(rig, "a/footpedals/camera", 1).clutched
+    assert pedal_sample(rig, "a/footpedals/clutch", 1).buttons == 0b10, "any other button stops"
     device.close()
-    device = connect(service, pedals="")
-    assert pedal_sample(device, service, "footpedals/clutch", 1).clutched is False
+    device = rig.open(pedals="")
+    assert pedal_sample(rig, "footpedals/clutch", 1).clutched is False
     device.close()
 
 
-def test_a_pedal_without_a_button_is_a_fault(service, device):
-    drive(device, service, 1)
+def test_a_pedal_without_a_button_is_a_fault(service, device, rig):
+    rig.drive(1)
     for message in ({"axes": [], "buttons": []}, {"buttons": [7]}, {}):
         service.publish("/footpedals/coag", message)
         with pytest.raises(DeviceError, match="sends no button"):
-            read_when_it_comes(device, service.clock.loop)
+            read_when_it_comes(device, rig.now)
 
 
-def test_one_wrench_for_each_fresh_position(service, device):
+def test_one_wrench_for_each_fresh_position(service, device, rig):
     began = device.published
-    drive(device, service, 20, (0.0, 1.0, 0.0))
+    rig.drive(20, (0.0, 1.0, 0.0))
     assert device.published == service.wrenches == began + 20
-    now = service.clock.loop
+    now = rig.now
     for k in range(5):  # no position, no wrench
         device.read(now + 1e-4 * k)
         device.write(np.array([0.0, 1.0, 0.0]))
@@ -373,30 +275,16 @@ def test_one_wrench_for_each_fresh_position(service, device):
     assert device.published == began + 22, "and again from time to time: ROS may lose one"
 
 
-def test_a_wrench_bears_the_stamp_of_its_position(service, device):
-    drive(device, service, 3, (0.0, 0.0, 1.0))
-    assert service.stamp["sec"] + 1e-9 * service.stamp["nanosec"] == pytest.approx(
-        service.clock.time, abs=2e-9
-    )
+def test_a_wrench_bears_the_stamp_of_its_position(service, device, rig):
+    rig.drive(3, (0.0, 0.0, 1.0))
+    assert service.stamp["sec"] + 1e-9 * service.stamp["nanosec"] == pytest.approx(rig.clock.time, abs=2e-9)
 
 
 @pytest.mark.parametrize("wrench", ["body/servo_cf", "servo_cf"])
-def test_the_force_is_in_the_axes_of_the_base(service, wrench):
-    device = connect(service, wrench=wrench)
-    drive(device, service, 3, (1.0, 2.0, 3.0))
+def test_the_force_is_in_the_axes_of_the_base(service, wrench, rig):
+    device = rig.open(wrench=wrench)
+    rig.drive(3, (1.0, 2.0, 3.0))
     np.testing.assert_array_equal(service.force(), [1.0, 2.0, 3.0])
-    device.close()
-
-
-def test_the_device_axes_are_a_rotation(service):
-    device = connect(service, origin="base")
-    service.faults.position = (0.01, 0.02, 0.03)  # away, left, up
-    place = drive(device, service, 2)[-1][0]
-    np.testing.assert_allclose(place, [0.01, 0.02, 0.03])
-    turn = np.array(device.traits.axes)
-    assert np.linalg.det(turn) == pytest.approx(1.0)
-    np.testing.assert_allclose(turn @ place, [-0.02, 0.03, -0.01])  # right, up, towards the user
-    assert device.traits.axes == device_traits("crtk").axes
     device.close()
 
 
@@ -407,107 +295,81 @@ def test_other_axes_are_given_in_words():
             axes_in_words(text)
 
 
-def test_the_centre_is_where_the_handle_is_while_it_is_opened(clock):
-    with serve(clock, amplitude=0.0) as service:
+def test_the_centre_is_where_the_handle_is_while_it_is_opened():
+    with CrtkRig(amplitude=0.0) as rig:
+        service = rig.service
         service.faults.position = (0.3, 0.2, 0.1)
-        device = connect(service)
-        np.testing.assert_allclose(drive(device, service, 2)[-1][0], 0.0, atol=1e-12)
+        device = rig.open(origin="here")
+        np.testing.assert_allclose(rig.drive(2)[-1][0], 0.0, atol=1e-12)
         device.close()
 
 
-def test_ages_come_from_the_stamps_whatever_clock_they_are_of(service, device):
-    ages = [age for _, age in drive(device, service, 50)]
+def test_ages_come_from_the_stamps_whatever_clock_they_are_of(service, device, rig):
+    ages = [age for _, age in rig.drive(50)]
     assert ages == pytest.approx([0.0] * 50, abs=1e-5)
     for _ in range(30):  # each position takes 5 ms longer than the fastest
-        service.clock.time += TICK
+        rig.clock.time += TICK
         service.step()
-        sample = device.read(service.clock.loop + 0.005)
-    assert service.clock.loop + 0.005 - sample.time == pytest.approx(0.005, abs=1e-4)
+        sample = device.read(rig.now + 0.005)
+    assert rig.now + 0.005 - sample.time == pytest.approx(0.005, abs=1e-4)
 
 
-def test_clocks_that_part_slowly_make_no_sample_old(service, device):
+def test_clocks_that_part_slowly_make_no_sample_old(service, device, rig):
     for k in range(300):
-        service.clock.time += 0.1
+        rig.clock.time += 0.1
         service.step()
-        now = service.clock.loop + 1e-4 * 0.1 * k
+        now = rig.now + 1e-4 * 0.1 * k
         sample = device.read(now)
     assert now - sample.time < 1e-3
 
 
-def test_half_the_round_trip_is_the_age_of_the_youngest_and_half_the_devices_delay(service):
-    device = connect(service, delay=0.006)
+def test_half_the_round_trip_is_the_age_of_the_youngest_and_half_the_devices_delay(service, rig):
+    device = rig.open(delay=0.006)
     assert device.traits.delay == 0.003
-    assert [age for _, age in drive(device, service, 5)] == pytest.approx([0.003] * 5, abs=1e-6)
+    assert [age for _, age in rig.drive(5)] == pytest.approx([0.003] * 5, abs=1e-6)
     device.close()
 
 
-def test_the_delay_softens_a_body(clock, plain, shared):
+def test_the_delay_softens_a_body(plain, shared):
     """K < b/(T/2 + d): with 0.5 N·s/m and 10 ms of delay 48 N/m."""
-    with serve(clock) as service:
-        device = connect(service, delay=0.010)
-        loop = Loop(plain, device, shared, Workspace(0.1, 1.0), Limits(3.0), rate=1000.0, stiffness=300.0)
-        for _ in range(50):
-            service.clock.time += TICK
-            service.step()
-            loop.tick(service.clock.loop)
+    with CrtkRig() as rig:
+        device = rig.open(delay=0.010)
+        rig.looped = loop = Loop(plain, device, shared, Workspace(0.1, 1.0), Limits(3.0), stiffness=300.0)
+        rig.run(50)
         assert loop.bounds.bound == pytest.approx(0.5 / (0.0005 + 0.010), rel=0.05)
         assert loop.bounds.warning
         loop.end()
 
 
-def test_the_round_trip_is_measured(clock, monkeypatch):
-    monkeypatch.setattr(crtk, "LONGEST_DELAY", 1.0)  # the machine may have much else to do
-    with serve(clock, rate=200.0) as service:
-        device = connect(service, delay=-1.0)
-        assert 0.0 < device.round_trip < 1.0
+def test_the_round_trip_is_measured(monkeypatch):
+    monkeypatch.setattr(crtk, "LONGEST_DELAY", 60.0)  # the machine may have much else to do
+    with CrtkRig(rate=200.0) as rig:
+        service = rig.service
+        device = rig.open(delay=-1.0)
+        assert 0.0 < device.round_trip < 60.0
         assert device.traits.delay == 0.5 * device.round_trip
         device.close()
         service.faults.deaf = True
         with pytest.raises(DeviceError, match="sends nothing back") as caught:
-            connect(service, delay=-1.0, search=0.5)
+            rig.open(delay=-1.0, search=0.5)
         assert "crtk:delay=SECONDS" in caught.value.fix
         service.faults.deaf = False
         monkeypatch.setattr(crtk, "LONGEST_DELAY", 1e-6)
         with pytest.raises(DeviceError, match="and back takes"):
-            connect(service, delay=-1.0)
+            rig.open(delay=-1.0)
 
 
-def test_the_loop_pushes_on_the_hand_against_its_way(rig):
-    places, forces = [], []
-    for _ in range(250):  # a whole stroke: on the way back from the first press, damping may turn the force
-        assert rig.run(1)[0][1] is Fault.NONE
-        places.append(rig.device.sample.position.copy())
-        forces.append(rig.service.force())
-    k = np.argmax(np.abs(np.array(forces)[:, 2]))
-    assert forces[k][2] * places[k][2] < 0.0
-    assert abs(forces[k][2]) > 0.3
-    np.testing.assert_allclose(np.array(forces)[:, :2], 0.0, atol=1e-9)
-
-
-def test_a_silent_arm_is_zero_force_within_20_ms_and_a_reason(rig):
-    rig.press()
-    rig.service.faults.held = True
-    silent = rig.run(50)
-    late = round(HARDWARE_PATIENCE / TICK) + 1
-    assert all(force == 0.0 and fault is Fault.INPUT_STALLED for force, fault in silent[late:])
-    np.testing.assert_array_equal(rig.service.force(), np.zeros(3))
-    rig.service.release()  # fifty old positions at once
-    again = rig.run(200)
-    assert again[-1][1] is Fault.NONE
-    assert max(force for force, _ in again) > 0.0
-
-
-def test_late_doubled_and_lost_messages_are_no_fresh_samples(service, device):
-    drive(device, service, 5)
+def test_late_doubled_and_lost_messages_are_no_fresh_samples(service, device, rig):
+    rig.drive(5)
     service.faults.doubled = 3
-    drive(device, service, 4)
+    rig.drive(4)
     assert device.repeated == 3
     service.faults.swapped = 1
-    drive(device, service, 4)
+    rig.drive(4)
     assert device.repeated == 4
     assert device.note.startswith("4 positions")
     service.faults.dropped = 3
-    ages = [age for _, age in drive(device, service, 6)]
+    ages = [age for _, age in rig.drive(6)]
     assert max(ages) == pytest.approx(0.003, abs=1e-5)
     assert ages[-1] == pytest.approx(0.0, abs=1e-5)
 
@@ -522,102 +384,78 @@ def test_late_doubled_and_lost_messages_are_no_fresh_samples(service, device):
         ("ENABLED", False, "has not been homed"),
     ],
 )
-def test_states_are_faults_in_words_and_refused_at_the_start(rig, state, homed, words):
+def test_states_are_faults_in_words_and_refused_at_the_start(rig, state, homed, words, loop):
     rig.press()
     rig.service.state, rig.service.homed = state, homed
     seen = rig.run(5)
     assert seen[-1] == (0.0, Fault.DEVICE_STOPPED)
-    assert words in rig.loop.device_error
+    assert words in loop.device_error
     np.testing.assert_array_equal(rig.service.force(), np.zeros(3))
+    device = rig.device
     if state:
         with pytest.raises(DeviceError, match=words):
-            connect(rig.service)
-    rig.service.stream(False)
-    rig.service.clock.running = False
-    leave_unread(rig.device)
+            rig.connect()
+    rig.stand(device)
     rig.service.state, rig.service.homed = "ENABLED", True
     assert rig.run(200)[-1][1] is Fault.NONE
 
 
-def test_an_arm_is_enabled_and_homed_only_when_asked(service):
+def test_an_arm_is_enabled_and_homed_only_when_asked(service, rig):
     service.state, service.homed = "DISABLED", False
     for settings in ({}, {"home": 1.0}):
         with pytest.raises(DeviceError, match="its motors are off") as caught:
-            connect(service, **settings)
+            rig.open(**settings)
         assert "enable=1" in caught.value.fix
     assert (service.state, service.homed) == ("DISABLED", False), "it doesn't move unasked"
     with pytest.raises(DeviceError, match="homed"):
-        connect(service, enable=1.0)
-    connect(service, enable=1.0, home=1.0).close()
+        rig.open(enable=1.0)
+    rig.open(enable=1.0, home=1.0).close()
     assert (service.state, service.homed) == ("ENABLED", True)
 
 
-def test_an_arm_without_a_state(service):
+def test_an_arm_without_a_state(service, rig):
     service.faults.stateless = True
     with pytest.raises(DeviceError, match="state=0"):
-        connect(service, search=0.3)
-    device = connect(service, state=0.0)
-    drive(device, service, 3, (0.0, 0.0, 1.0))
+        rig.open(search=0.3)
+    device = rig.open(state=0.0)
+    rig.drive(3, (0.0, 0.0, 1.0))
     assert device.sample.holding
     device.close()
 
 
-def test_headers_without_stamps(service):
+def test_headers_without_stamps(service, rig):
     service.faults.stampless = True
-    device = connect(service, delay=0.004)
-    assert [age for _, age in drive(device, service, 5)] == pytest.approx([0.002] * 5)
+    device = rig.open(delay=0.004)
+    assert [age for _, age in rig.drive(5)] == pytest.approx([0.002] * 5)
     device.close()
 
 
-def test_a_position_that_is_no_number_is_a_fault(rig):
-    rig.run(50)
-    rig.service.faults.position = (math.nan, 0.0, 0.0)
-    assert rig.run(3)[-1] == (0.0, Fault.INPUT_NOT_FINITE)
-    rig.service.faults.position = None
-    assert rig.run(60)[-1][1] is Fault.NONE
-
-
-def test_a_force_that_is_no_number_is_not_sent(service, device):
-    drive(device, service, 3, (1.0, 0.0, 0.0))
-    with pytest.raises(DeviceError, match="not a finite number"):
-        device.write(np.array([math.nan, 0.0, 0.0]))
-    np.testing.assert_array_equal(service.force(), [1.0, 0.0, 0.0])
-
-
-def test_complaints_of_the_bridge_are_a_fault_with_its_words(rig):
+def test_complaints_of_the_bridge_are_a_fault_with_its_words(rig, loop):
     rig.run(50)
     rig.service.faults.complaint = "publish: the arm is shy"
     assert rig.run(1)[-1] == (0.0, Fault.DEVICE_ERROR)
-    assert "the arm is shy" in rig.loop.device_error
+    assert "the arm is shy" in loop.device_error
     assert rig.run(20)[-1][1] is Fault.NONE
 
 
-def test_a_closed_bridge_is_a_fault_with_its_reason_and_found_again(rig, service):
+def test_a_closed_bridge_is_a_fault_with_its_reason_and_found_again(rig, service, loop):
     rig.run(60)
     rig.service.restart()
     seen = rig.run(30)
     assert all(force == 0.0 and fault is Fault.DEVICE_LOST for force, fault in seen[3:])
-    assert "ROS bridge" in rig.loop.device_error
-    connect(rig.service).close()  # nothing is left that a new start doesn't heal
+    assert "ROS bridge" in loop.device_error
+    rig.device.close()
+    rig.connect().close()  # nothing is left that a new start doesn't heal
+    wait_for(lambda: not service._clients)  # the last words of those before have been heard
     service.faults.closing = True
     with pytest.raises(DeviceLostError, match="closed the connection"):
-        connect(service)
+        rig.open()
 
 
-def test_closing_sends_zero_and_refuses_more(service, device):
-    drive(device, service, 5, (0.0, 0.0, 1.0))
-    device.close()
-    device.close()
-    assert service.await_wrenches(device.published)
-    np.testing.assert_array_equal(service.force(), np.zeros(3))
-    for call in (lambda: device.write(np.zeros(3)), lambda: device.read(0.0)):
-        with pytest.raises(DeviceError, match="is closed"):
-            call()
-
-
-def test_the_last_zero_arrives_though_positions_were_left_unread(clock):
+def test_the_last_zero_arrives_though_positions_were_left_unread():
     """A socket closed with messages unread resets the connection, and the other end may lose what was sent last."""
-    with serve(clock, rate=10_000.0) as service:
+    with CrtkRig(rate=10_000.0) as rig:
+        service = rig.service
         for k in range(1, 21):
             channel = WebsocketChannel(f"ws://127.0.0.1:{service.port}", "ROS bridge")
             for topic, kind in (("measured_cp", "PoseStamped"), ("measured_cv", "TwistStamped")):
@@ -632,53 +470,25 @@ def test_the_last_zero_arrives_though_positions_were_left_unread(clock):
             assert service.await_wrenches(k), f"the last message of connection {k} was lost"
 
 
-def test_a_hanging_bridge_can_not_hold_up_the_driver(service, device):
-    drive(device, service, 3)
+def test_a_hanging_bridge_can_not_hold_up_the_driver(service, device, rig):
+    rig.drive(3)
     service.hang()
-    now = service.clock.loop
+    now = rig.now
     for k in range(200):
         device.read(now + k * TICK)
         device.write(np.array([0.0, 0.0, 1.0]))
     assert device.sample.time <= now, "its samples get old"
 
 
-def test_a_start_that_is_wild_or_slow_is_refused(clock):
-    with serve(clock) as service:
-        service.faults.runaway = 0.01
-        with pytest.raises(DeviceError, match="Hold it still"):
-            connect(service)
-        service.faults.runaway = 0.0
-        connect(service).close()
-    with serve(clock, rate=20.0) as service, pytest.raises(DeviceError, match="positions within"):
-        connect(service, search=0.5)
+def test_an_arm_that_sends_too_seldom_is_refused():
+    with CrtkRig(rate=20.0) as rig, pytest.raises(DeviceError, match="positions within"):
+        rig.open(search=0.5)
 
 
-def test_addresses_and_namespaces_that_are_wrong(service):
+def test_addresses_and_namespaces_that_are_wrong(service, rig):
     with pytest.raises(DeviceError, match="No position comes from /leg/measured_cp"):
-        connect(service, arm="leg", search=0.2)
+        rig.open(arm="leg", search=0.2)
     with pytest.raises(DeviceError, match="ROS bridge at ws://127"):
         CrtkDevice(CrtkSettings("ws://127.0.0.1:9"))
     with pytest.raises(PortInUseError, match="other ports"):
         CrtkSimulator(CrtkSimulatorSettings(port=service.port)).start()
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        "types=ros3",
-        "force=99",
-        "radius=1",
-        "delay=1",
-        "wrench=servo_cp",
-        "axes=xyz",
-        "home=2",
-        "origin=x",
-        "gravity=2",
-        "lock=-1",
-        "clutch=coag",
-        "hold=knee",
-    ],
-)
-def test_options_out_of_range(shared, options):
-    with pytest.raises(UsageError):
-        device_named(f"crtk:{options}", shared.command)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from palpate.devices import device_traits
-from palpate.devices.device import settings_from
+from palpate.devices.device_options import settings_from
 from palpate.devices.stroke import StrokeSettings
 from palpate.errors import UsageError
 

@@ -6,6 +6,7 @@ its driver fails here.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import json
 from pathlib import Path
@@ -13,11 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from library_double import LibraryDouble
+from rigs import HaplyRig
 
-from palpate.devices.doubles.haply_simulator import HaplySimulator, SimulatorSettings
 from palpate.devices.force_dimension import TYPES, ForceDimensionDevice, ForceDimensionSettings
 from palpate.devices.force_dimension_library import FORCES_OFF, LOST, OPTIONAL, Status
-from palpate.devices.haply import HaplyDevice, HaplySettings
 from palpate.devices.haply_frames import (
     choose_profile,
     device_types,
@@ -31,59 +31,24 @@ from palpate.devices.openhaptics_library import NO_DEVICE, Code, HdLibrary
 from palpate.devices.profiles import PROFILES, device_profile, weakest_profile
 from palpate.devices.websocket_channel import WebsocketChannel
 from palpate.errors import DeviceError
-from palpate.runtime import Workspace
-from palpate.runtime.loop import Loop
-from palpate.runtime.safety import Limits
 
 DATA = Path(__file__).parents[1] / "data" / "devices"
 HAPLY, DHD, HD = (
     json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
     for name in ("haply", "force-dimension", "openhaptics")
 )
-TICK = 1e-3
 INVENTORIES = pytest.mark.parametrize("example", HAPLY["inventories"], ids=lambda e: e["title"])
 
 
-class Clock:
-    """A clock that stands still until it is moved."""
-
-    time = 0.0
-
-    def __call__(self):
-        return self.time
-
-
 @pytest.fixture
-def clock():
-    return Clock()
+def serve():
+    """Starts a service with an inventory."""
+    with contextlib.ExitStack() as stack:
+        yield lambda frame, **settings: stack.enter_context(HaplyRig(inventory=frame, **settings))
 
 
-@pytest.fixture
-def serve(clock):
-    services = []
-
-    def started(frame, **settings):
-        service = HaplySimulator(SimulatorSettings(port=0, events=0, **settings), clock, inventory=frame)
-        services.append(service.start())
-        return service
-
-    yield started
-    for service in services:
-        service.stop()
-
-
-def connect(service, example, **settings):
-    spelling = "auto" if example["echoes"] else "values"
-    usual = {"events": float(service.events_port), "wait": 1.0, "search": 0.0, "spelling": spelling}
-    return HaplyDevice(HaplySettings(url=f"ws://127.0.0.1:{service.port}", **(usual | settings)))
-
-
-def drive(device, clock, ticks, force=(0.0, 0.0, 0.0)):
-    for _ in range(ticks):
-        clock.time += TICK
-        sample = device.read(clock.time)
-        device.write(np.array(force))
-    return sample
+def connect(rig, example, **settings):
+    return rig.open(**({"spelling": "auto" if example["echoes"] else "values"} | settings))
 
 
 def frames(service):
@@ -107,7 +72,7 @@ def form(value):
 
 @INVENTORIES
 def test_a_double_keeps_the_form_of_the_makers_frames(serve, example):
-    first, later = frames(serve(example["frame"]))
+    first, later = frames(serve(example["frame"]).service)
     first.pop("session_id")
     assert form(first) == form({k: v for k, v in example["frame"].items() if k != "session_id"})
     for entry in (*first["inverse3"], *first["verse_grip"], *first.get("wireless_verse_grip", ())):
@@ -116,7 +81,7 @@ def test_a_double_keeps_the_form_of_the_makers_frames(serve, example):
 
 
 def test_the_doubles_own_frames_have_the_form_of_the_makers(serve):
-    frame, _ = frames(serve(None, grip="both"))
+    frame, _ = frames(serve(None, grip="both").service)
     maker = HAPLY["inventories"][0]["frame"]
 
     def check(ours, theirs, where):
@@ -135,9 +100,9 @@ def test_the_doubles_own_frames_have_the_form_of_the_makers(serve):
 
 
 @INVENTORIES
-def test_a_driver_drives_the_makers_device(serve, clock, example):
-    service = serve(example["frame"])
-    device = connect(service, example)
+def test_a_driver_drives_the_makers_device(serve, example):
+    rig = serve(example["frame"])
+    device = connect(rig, example)
     profile = PROFILES[example["profile"]]
     assert device.profile is profile
     assert (device.traits.radius, device.traits.max_force) == (profile.radius, profile.max_force)
@@ -145,58 +110,51 @@ def test_a_driver_drives_the_makers_device(serve, clock, example):
     assert ("doesn't tell whether its origin" in device.note) is (
         "preset" not in example["frame"]["inverse3"][0]["config"]
     )
-    drive(device, clock, 60, (0.0, 0.0, 0.5))
-    device.read(clock.time)
-    np.testing.assert_allclose(service.force(), [0.0, 0.0, 0.5])
+    rig.drive(60, (0.0, 0.0, 0.5))
+    np.testing.assert_allclose(rig.force(), [0.0, 0.0, 0.5])
     device.close()
 
 
 @INVENTORIES
-def test_each_button_of_the_makers_grips_stops_the_force(serve, clock, example, plain, shared):
+def test_each_button_of_the_makers_grips_stops_the_force(serve, example, plain, shared):
     """The button of a wired grip was read in the wired grip's own field by nobody."""
-    service = serve(example["frame"])
-    device = connect(service, example)
-    loop = Loop(plain, device, shared, Workspace(0.04, 3.3), Limits(3.3), rate=1000.0)
-
-    def run(ticks):
-        for _ in range(ticks):
-            clock.time += TICK
-            loop.tick(clock.time)
-
-    run(400)
-    assert np.linalg.norm(loop.safety.force) > 0.1, "it is pressed"
-    service.press(example["buttons"][0])
-    run(3)
+    rig = serve(example["frame"])
+    loop = rig.loop(plain, shared, opened=connect(rig, example))
+    device = rig.device
+    assert rig.press()[-1][0] > 0.1, "it is pressed"
+    rig.service.press(example["buttons"][0])
+    rig.run(3)
     assert not loop.safety.force.any()
     for name in example["buttons"]:
-        service.press(name)
-        run(3)
+        rig.service.press(name)
+        rig.run(3)
         assert device.sample.buttons, name
-        service.press(*example["buttons"], down=False)
-        run(3)
+        rig.service.press(*example["buttons"], down=False)
+        rig.run(3)
         assert not device.sample.buttons
     loop.end()
 
 
 @INVENTORIES
-def test_each_button_of_the_makers_grips_can_hold(serve, clock, example):
-    service = serve(example["frame"])
+def test_each_button_of_the_makers_grips_can_hold(serve, example):
+    rig = serve(example["frame"])
     for name in example["buttons"]:
-        device = connect(service, example, hold=name)
-        assert not drive(device, clock, 3).holding
-        service.press(name)
-        assert drive(device, clock, 3).holding, name
+        device = connect(rig, example, hold=name)
+        assert not rig.sample(3).holding
+        rig.service.press(name)
+        assert rig.sample(3).holding, name
         assert device.sample.buttons == 0, "its driver has it"
-        service.press(name, down=False)
-        assert not drive(device, clock, 3).holding
+        rig.service.press(name, down=False)
+        assert not rig.sample(3).holding
         device.close()
 
 
-def test_a_service_that_echoes_no_force_asks_for_the_spelling(serve, clock):
+def test_a_service_that_echoes_no_force_asks_for_the_spelling(serve):
     example = next(e for e in HAPLY["inventories"] if not e["echoes"])
-    device = connect(serve(example["frame"]), example, spelling="auto")
+    rig = serve(example["frame"])
+    device = connect(rig, example, spelling="auto")
     with pytest.raises(DeviceError, match=r"echoes no force, as before version 3\.5"):
-        drive(device, clock, 60, (0.0, 0.0, 0.5))
+        rig.drive(60, (0.0, 0.0, 0.5))
     device.close()
 
 

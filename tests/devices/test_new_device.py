@@ -12,7 +12,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from palpate.devices.device import Sample, Traits, settings_from
+from palpate.devices.device import Sample, Traits
+from palpate.devices.device_options import settings_from
 from palpate.errors import DeviceError
 from palpate.runtime import Fault, Workspace
 from palpate.runtime.loop import Loop

@@ -17,6 +17,7 @@ from palpate.runtime import LoopProcess
 from palpate.runtime.safety import Fault
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.memories import Relaxation
+from waiting import wait_for
 
 
 @pytest.fixture(scope="module")
@@ -51,13 +52,6 @@ def test_every_fault_of_the_loop_is_injected(beam):
         beam.inject("coffee")
 
 
-def until(condition, seconds=20.0):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.001)
-
-
 @pytest.mark.full
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="a kill that nothing survives is POSIX")
 def test_a_killed_process_leaves_no_force_and_is_healed_by_a_restart(tmp_path):
@@ -67,11 +61,12 @@ def test_a_killed_process_leaves_no_force_and_is_healed_by_a_restart(tmp_path):
     with HaplySimulator(settings) as service:
         device = f"haply:ws://127.0.0.1:{service.port},events={service.events_port}"
         with LoopProcess(path, device=device) as loop:
-            until(lambda: service.force().any())
+            wait_for(lambda: service.force().any(), pause=0.001)
             os.kill(loop.pid, signal.SIGKILL)
-            killed = time.monotonic()
-            until(lambda: time.monotonic() > killed + 0.020)
-            until(lambda: not loop.alive)
+            wait_for(
+                lambda: not loop.alive and not service._clients
+            )  # so all that it had sent has been obeyed
+            wait_for(lambda: time.monotonic() > service.lapses_at())
             assert not service.force().any()
         with LoopProcess(path, device=device):
-            until(lambda: service.force().any())
+            wait_for(lambda: service.force().any(), pause=0.001)

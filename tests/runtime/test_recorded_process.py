@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
-import itertools
 import json
 import os
 import signal
@@ -25,13 +24,7 @@ from palpate.errors import FileFormatError, ResourceError, UsageError
 from palpate.runtime import LoopProcess, now
 from palpate.runtime.replay import Replay, is_recorded_model
 from palpate.runtime.touchable import load_touchable
-
-
-def wait_for(condition, seconds=20.0):
-    until = now() + seconds
-    while not condition():
-        assert now() < until, "waited in vain"
-        time.sleep(0.01)
+from waiting import wait_for
 
 
 def assert_same(path, model):
@@ -81,18 +74,19 @@ def test_a_replay_is_published_at_its_own_pace(spring_file, tmp_path):
     assert len(seen) > 20
     for tick, force in seen.items():
         np.testing.assert_array_equal(force, trace.ticks["force"][tick - 1])
-    assert all(abs(b.time - a.time) < 1.0 for a, b in itertools.pairwise(states))
+    behind = [s.time - trace.ticks["time"][s.tick - 1] for s in states if s.tick in seen]
+    assert max(behind) - min(behind) < 1e-6, "s: each tick is as long after the first as it was"
 
 
 @pytest.mark.full
 @pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
-def test_a_killed_recorder_loses_less_than_a_second(spring_file, tmp_path):
+def test_a_killed_recorder_keeps_all_that_it_said_it_had_written(spring_file, tmp_path):
     path = tmp_path / "a.trace"
     script = (
         "import sys, time; from palpate.runtime import LoopProcess\n"
         "with LoopProcess(sys.argv[1], device='stroke', record=sys.argv[2]) as loop:\n"
         "    while True:\n"
-        "        time.sleep(0.05); print(loop.read().tick, flush=True)\n"
+        "        time.sleep(0.05); print(loop.recording.ticks, flush=True)\n"
     )
     with subprocess.Popen(
         [sys.executable, "-c", script, spring_file, path], stdout=subprocess.PIPE, text=True
@@ -104,7 +98,7 @@ def test_a_killed_recorder_loses_less_than_a_second(spring_file, tmp_path):
                 break
         process.send_signal(signal.SIGKILL)
     trace = read_trace(path)
-    assert len(trace) > last - 1000 > 0
+    assert len(trace) >= last > 0
     assert "has no end" in trace.notes[0]
     assert Replay(trace, load_touchable(spring_file)).run().identical
 

@@ -238,7 +238,7 @@ def test_a_recorded_hand_drives_another_body(tmp_path):
                 Shared.private(), other.workspace(hand.traits.radius), LIMITS)  # fmt: skip
     loop.run_for(0.4)
     assert loop.fault is Fault.NONE
-    with pytest.raises(UsageError, match="needs the file"):
+    with pytest.raises(UsageError, match="the file of a recorded touch"):
         device_named("trace:speed=2", Shared.private().command)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 
 import pytest
 
@@ -13,9 +12,10 @@ import held
 import pressed
 from palpate.devices.trace_file import read_trace
 from palpate.errors import DeviceError, FileFormatError, UsageError
-from palpate.runtime import LoopProcess, now
+from palpate.runtime import Fault, LoopProcess
 from palpate.runtime.replay import Replay, is_recorded_model
 from palpate.runtime.touchable import load_touchable
+from waiting import wait_for
 
 
 @pytest.fixture(scope="module")
@@ -27,11 +27,9 @@ def files(tmp_path_factory):
     }
 
 
-def wait_for(condition, seconds=20.0):
-    until = now() + seconds
-    while not condition():
-        assert now() < until, "waited in vain"
-        time.sleep(0.01)
+def other_faults(state):
+    """The count of all faults but jumps of a busy machine's clock."""
+    return state.faults - state.fault_counts[Fault.CLOCK_JUMP]
 
 
 def test_surrogates_take_over_while_the_loop_ticks_and_are_replayed(files, tmp_path):
@@ -46,7 +44,7 @@ def test_surrogates_take_over_while_the_loop_ticks_and_are_replayed(files, tmp_p
         loop.stop_recording()
         loop.start_recording(part)
         wait_for(lambda: loop.recording.ticks > 200)
-        assert loop.read().faults == 0
+        assert other_faults(loop.read()) == 0
     trace = read_trace(whole)
     assert [event["loop_tick"] for event in trace.events if event["kind"] == "swap"] == [first, second]
     assert is_recorded_model(trace, files[1.0])
@@ -75,7 +73,7 @@ def test_what_can_not_take_over_leaves_the_old_body_in_the_hand(files, tmp_path)
             loop.swap(files[1.5], seconds=0.01)
         state = loop.read()
         assert state.tick > before
-        assert (state.swaps, state.blending, state.faults) == (0, False, 0)
+        assert (state.swaps, state.blending, other_faults(state)) == (0, False, 0)
         loop.swap(files[1.5])
     assert loop.report().obtained, "what it said besides is not lost"
 

@@ -6,16 +6,20 @@ folder. A baseline or memory of palpate's is entered in `test_contract.py`; anot
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.dispatcher import Dispatcher
 from touch_made import differences
 
 import palpate as pp
 from allocated import kept_by
+from palpate.kernels import interpreted
 from palpate.runtime.touchable import touchable
+from palpate.surrogates.energy_kernels import ANSWER, entry_of, trusts_into
 from palpate.surrogates.memories import MemoryState
 from palpate.units import bounds
 
@@ -194,7 +198,27 @@ def inside_is_told_from_outside(example: Example, folder: Path) -> None:
     assert not evaluate.inside
 
 
+def interpreted_kernels_answer_as_compiled_ones(example: Example, folder: Path) -> None:
+    energy = example.body.energy
+    X = np.ascontiguousarray(energy._places(np.vstack([example.around(30), example.rest[:5]])))
+    rows, found = entry_of(energy.baseline.compiled()).rows, []
+    for own in (rows, interpreted(rows)):
+        answers, inside = np.empty((len(X), ANSWER)), np.empty(len(X), dtype=bool)
+        own(X, answers, inside, *energy.compiled())
+        found.append((answers, inside))
+    _agree(*(answers for answers, _ in found))
+    assert np.array_equal(found[0][1], found[1][1])
+    if energy.root is not None:
+        root, net = energy._compiled_posterior()
+        inputs, scratch = example.around(30), np.zeros((4, root.shape[1]))
+        found = [np.empty(30), np.empty(30)]
+        for own, out in zip((trusts_into, interpreted(trusts_into)), found, strict=True):
+            own(inputs, answers, out, root, scratch, energy._constants[3], net)
+        _agree(*found)
+
+
 CHECKS = (
+    interpreted_kernels_answer_as_compiled_ones,
     exactly_nothing_at_rest,
     force_and_stiffness_are_derivatives_of_the_energy,
     no_closed_path_yields_work,
@@ -292,7 +316,29 @@ def a_tick_with_a_memory_allocates_nothing(example: Example, folder: Path) -> No
     require_no_allocation(example)
 
 
+def interpreted_memories_step_as_compiled_ones(example: Example, folder: Path) -> None:
+    body, forces = example.body, []
+    module = sys.modules[type(body.memory).__module__]
+    kernels = {name: own for name, own in vars(module).items() if isinstance(own, Dispatcher)}
+    way = body.energy._places(example.around(12))
+    for change in (lambda own: own, interpreted):
+        with pytest.MonkeyPatch.context() as patch:
+            for name, own in kernels.items():
+                patch.setattr(module, name, change(own))
+            evaluator, memory = body.energy.evaluator(), body.memory.start()
+            for place in way:
+                evaluator(place[:3], place[3:])
+                memory.step(place[:3].copy(), evaluator.amplitude, evaluator.slope, 0.01)
+                forces.append([*memory.force, memory.stored])
+    _agree(*np.split(np.array(forces), 2))
+
+
+def _agree(a: np.ndarray, b: np.ndarray) -> None:
+    np.testing.assert_allclose(a, b, rtol=1e-13, atol=1e-13 * np.abs(a).max())
+
+
 MEMORY_CHECKS = (
+    interpreted_memories_step_as_compiled_ones,
     a_memory_gives_back_no_more_than_was_put_in,
     a_memory_without_a_past_answers_elastically,
     a_memory_starts_anew_from_a_file_and_after_a_reset,

@@ -11,10 +11,11 @@ import pytest
 from blocks import SIZE, ball, block_mesh, dent, dents
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.physics.shapes.mesh import outer_faces
 from palpate.viewer import BodyViewer
 from palpate.viewer.messages import Shown, Step, Surface
 from palpate.viewer.shown_body import ShownBody, body_of
-from palpate.viewer.surfaces import outer_triangles, split
+from palpate.viewer.surfaces import split
 from websocket_page import get
 
 
@@ -42,7 +43,7 @@ def test_a_ball_stays_whole():
 
 
 def test_the_skin_of_two_tetrahedra():
-    skin = outer_triangles(np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))
+    skin = outer_faces(np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))
     assert len(skin) == 6
     assert {1, 2, 3} not in [set(t) for t in skin.tolist()]
 

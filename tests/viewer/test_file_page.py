@@ -160,6 +160,7 @@ def test_a_notebook_shows_the_page(pressed: Surrogate):
     assert 'sandbox="allow-scripts allow-downloads"' in shown
     assert "<b>body</b>" not in shown
     assert "<title>&lt;b&gt;body&lt;/b&gt;" in bare.to_html()
+    assert "three.js authors" in bare.to_html()  # whose licence goes with their code
     hostile = replace(pressed, meta={"name": "<!--<script>"}).to_html()
     assert "<!--" not in hostile.partition("<body>")[2].replace("palpate-card", "")
 

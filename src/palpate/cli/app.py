@@ -78,6 +78,7 @@ AskToken = Annotated[
         help="Open the page only to who has its whole address. Without a token every user of this machine can open it.",
     ),
 ]
+StrictPort = Annotated[bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a web browser.")]
 
 STUDY = Path("study.toml")
@@ -252,9 +253,7 @@ def validate(
 def view(
     model: ModelFile,
     port: Port = None,
-    strict_port: Annotated[
-        bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")
-    ] = False,
+    strict_port: StrictPort = False,
     browser: Browser = True,
     token: AskToken = True,
     device: Device = "page",
@@ -280,9 +279,7 @@ def view(
 def show(
     file: Annotated[Path, typer.Argument(help="File (.vtu or .pvd) or dataset (.zarr) with solved bodies.")],
     port: Annotated[int, count_option("--port", least=0, most=65535, help="Port of the page.")] = 8080,
-    strict_port: Annotated[
-        bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")
-    ] = False,
+    strict_port: StrictPort = False,
     browser: Browser = True,
     token: AskToken = True,
 ) -> None:
@@ -449,12 +446,18 @@ def _serve(
 ) -> None:
     from palpate.cli.run_command import aim_device
     from palpate.runtime.touchable import load_touchable
+    from palpate.runtime.warm_up import WarmUp
 
-    Console().say(f"Opening the page of {model} …")  # the loop's own process takes some seconds to start
-    from palpate.viewer import serve
+    with WarmUp("loop") as warm_up:
+        words = f": {warm_up.words}" if warm_up.words else ""
+        # the loop's own process takes some seconds to start
+        Console().say(f"Opening the page of {model} …{words}")
+        from palpate.viewer import serve
 
-    body = load_touchable(model)
-    settings = body.meta.get("runtime", {})
+        body = load_touchable(model)
+        settings = body.meta.get("runtime", {})
+        device = aim_device(device, body)
+        warm_up.wait()
     serve(
         model,
         port=settings.get("port", 8080) if port is None else port,
@@ -463,7 +466,7 @@ def _serve(
         open_browser=browser and sys.stdout.isatty(),
         strict_port=strict_port,
         token=token,
-        device=aim_device(device, body),
+        device=device,
         unsoftened=unsoftened,
         controller=controller,
         dead_man=dead_man,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,7 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
     contents = load(model)
     what, inputs = type(contents).__name__, inputs_of(contents)
     if not at:
-        ranges = [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in inputs]
+        ranges = [asdict(r) for r in inputs]
         content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(contents)}
         warning = _warning(contents)
         noun = _NOUNS.get(what, what)
@@ -115,7 +116,7 @@ def _let_go(surrogate: Surrogate, X: np.ndarray) -> list[bool]:
     """
     body = touchable(surrogate)
     assert body.surface is not None
-    loop, (low, high) = body.evaluator(), body.surface.box
+    loop, (low, high) = body.evaluator(few=True), body.surface.box
     far = float(np.linalg.norm(high - low))
     ways = np.linspace(0.0, far, max(2, int(_STEPS * far / body.surface.radius)))
     gone = []

@@ -10,6 +10,7 @@ from palpate.cli.console import Console
 from palpate.errors import AccuracyError
 from palpate.files import system_errors
 from palpate.processes import CASE_LIMIT
+from palpate.runtime.warm_up import WarmUp
 from palpate.study import Study, preset_study
 from palpate.study.run import Outcome, Paths, carry_out, report_study
 from palpate.sweeps import LocalCluster, local_cluster
@@ -35,7 +36,9 @@ def run_demo(
         folder.mkdir(parents=True, exist_ok=True)
     began = time.perf_counter()
     console.say("Starting workers …")
-    with local_cluster(workers) as cluster:
+    kinds = sorted({"pressed" if study.presses else "held" for study in studies})
+    # the kernels of what is learnt are compiled beside the solves
+    with WarmUp(*kinds), local_cluster(workers) as cluster:
         outcomes = [_carry_out(study, folder, cluster, console, case_limit) for study in studies]
     console.say("report …")
     # one study's has its name, as `palpate validate` writes it, so that the next demo leaves it alone

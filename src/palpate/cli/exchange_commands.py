@@ -17,6 +17,9 @@ from palpate.output_files import require_outputs
 
 __all__ = ["card", "export_dataset"]
 
+ShownFile = Annotated[
+    Path, typer.Argument(help="Model file (.palpate) of a body that was learnt with its shape.")
+]
 Steps = Annotated[
     int, count_option("--steps", least=1, help="States of the stroke, from first contact to the deepest.")
 ]
@@ -156,9 +159,7 @@ def _rows(text: str | None, count: int) -> list[int] | None:
 
 @export_app.command("gltf")
 def to_gltf(
-    file: Annotated[
-        Path, typer.Argument(help="Model file (.palpate) of a body that was learnt with its shape.")
-    ],
+    file: ShownFile,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="File. Default: NAME.glb, beside the file.")
     ] = None,
@@ -169,16 +170,12 @@ def to_gltf(
     as_json: Json = False,
 ) -> None:
     """Write the body under a stroke as glTF (GLB), with the deformation as morph targets, for viewers and web pages."""
-    path = out or file.with_suffix(".glb")
-    require_outputs([path], endings=(".glb",), overwrite=force)
-    _write(file, path, stroke=(at, depth, steps), force=force, console=Console(as_json))
+    _write(file, out, (".glb",), stroke=(at, depth, steps), force=force, console=Console(as_json))
 
 
 @export_app.command("vtu")
 def to_vtu(
-    file: Annotated[
-        Path, typer.Argument(help="Model file (.palpate) of a body that was learnt with its shape.")
-    ],
+    file: ShownFile,
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", help="File (.pvd or .vtu). Default: NAME.pvd, beside the file."),
@@ -190,18 +187,25 @@ def to_vtu(
     as_json: Json = False,
 ) -> None:
     """Write the body under a stroke as VTU files and a PVD file, which ParaView plays."""
-    path = out or file.with_suffix(".pvd")
-    require_outputs([path], endings=(".pvd", ".vtu"), overwrite=force)
-    _write(file, path, stroke=(at, depth, steps), force=force, console=Console(as_json))
+    _write(file, out, (".pvd", ".vtu"), stroke=(at, depth, steps), force=force, console=Console(as_json))
 
 
 def _write(
-    file: Path, out: Path, *, stroke: tuple[str | None, float | None, int], force: bool, console: Console
+    file: Path,
+    out: Path | None,
+    endings: tuple[str, ...],
+    *,
+    stroke: tuple[str | None, float | None, int],
+    force: bool,
+    console: Console,
 ) -> None:
+    """Write the shapes of a stroke; by default to a file of the first ending beside the model."""
     from palpate.cli.drawn_stroke import reservations_about, stroke_of
     from palpate.export.shape_files import series_of_surrogate, write_shapes
     from palpate.surrogates import Surrogate
 
+    out = out or file.with_suffix(endings[0])
+    require_outputs([out], endings=endings, overwrite=force)
     at, depth, steps = stroke
     body = Surrogate.load(file)
     X = stroke_of(body, steps, at, depth)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -75,8 +75,8 @@ def fit_table(
         "table": str(path),
         "rows": len(X),
         "rows_left_out": int((~rows).sum()),
-        "inputs": [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in ranges],
-        "outputs": [{"name": q.name, "unit": q.unit} for q in quantities],
+        "inputs": [asdict(r) for r in ranges],
+        "outputs": [asdict(q) for q in quantities],
         "heldout": model.heldout,
         "notes": [*notes, *model.notes],
     }

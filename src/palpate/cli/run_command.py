@@ -18,6 +18,7 @@ from palpate.format import share
 from palpate.runtime import LoopProcess
 from palpate.runtime.shared_state import State
 from palpate.runtime.touchable import Touchable, load_touchable
+from palpate.runtime.warm_up import WarmUp
 from palpate.surrogates.surrogate import correction_warning
 
 __all__ = ["aim_device", "run_loop"]
@@ -90,10 +91,15 @@ def run_loop(
     controller damp, and with `dead_man` the force acts only while the device's first button is held. `record` is a new
     file that takes every tick; if it stops by itself the loop runs on, and a `ResourceError` follows the report.
     """
-    touch = load_touchable(model)
-    settings = touch.meta.get("runtime", {})
-    rate = rate or settings.get("rate", 1000.0)
-    device = aim_device(device, touch)
+    # the loop's kernels are compiled beside the body's
+    with WarmUp("loop") as warm_up:
+        touch = load_touchable(model)
+        settings = touch.meta.get("runtime", {})
+        rate = rate or settings.get("rate", 1000.0)
+        if warm_up.words:
+            console.say(f"{warm_up.words} …")
+        device = aim_device(device, touch)
+        warm_up.wait()
     if warning := correction_warning(touch.meta):
         console.say(f"its correction was warned of: {warning}")
     limit = settings.get("max_force")

@@ -21,6 +21,7 @@ from palpate.cli.improvement_lines import step_line
 from palpate.errors import PalpateError, UsageError
 from palpate.format import duration
 from palpate.processes import helper_environment, kill_group
+from palpate.runtime.warm_up import WarmUp
 from palpate.study import Study
 from palpate.viewer.part_page import PartPage, Progress
 from palpate.viewer.shown_part import PartChoices, ShownPart
@@ -86,6 +87,7 @@ class TouchedPart:
         self._made = time.monotonic()
         self._progress = Progress("starting", target=until)
         self._work = _Work()
+        self._warm_up = WarmUp("pressed", "loop")  # beside choosing, solving and learning
         self._stopped, self._begun, self._beginning = False, False, threading.Lock()
         self._bodies: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._threads: list[threading.Thread] = []
@@ -122,6 +124,7 @@ class TouchedPart:
         """End the work; everything that it has done is kept."""
         self._stopped = True
         self._bodies.put(None)
+        self._warm_up.close()
         self._work.close()
         for thread in self._threads:
             thread.join(1.0)
@@ -199,6 +202,9 @@ class TouchedPart:
                 path = self._bodies.get()
                 if path is None:
                     return
+            if words := self._warm_up.words:
+                self._log(words)
+            self._warm_up.wait()
             try:
                 self.page.show_body(path)
             except PalpateError as error:

@@ -8,6 +8,7 @@ import numpy as np
 
 from palpate.devices.crtk_pedals import PEDALS, Pedals
 from palpate.devices.device import Axes
+from palpate.devices.device_options import DeviceOptions, number, switch, word
 from palpate.errors import UsageError
 
 __all__ = [
@@ -15,12 +16,10 @@ __all__ = [
     "LARGEST_RADIUS",
     "LONGEST_DELAY",
     "TYPES",
-    "WRENCHES",
     "CrtkSettings",
     "axes_in_words",
 ]
 
-WRENCHES = ("body/servo_cf", "servo_cf")
 LARGEST_RADIUS, LARGEST_FORCE, LONGEST_DELAY = 0.15, 12.0, 0.02  # m, N, s
 TYPES = {
     "measured_cp": "geometry_msgs/PoseStamped",
@@ -40,67 +39,44 @@ TYPES = {
 
 
 @dataclass(frozen=True)
-class CrtkSettings:
+class CrtkSettings(DeviceOptions):
     """Settings of the connection."""
 
+    driver = "crtk"
     url: str = "ws://localhost:9090"  # address of the ROS bridge
     arm: str = ""  # namespace of the arm, such as MTMR; empty for none
-    wrench: str = "body/servo_cf"  # topic of the force, one of `WRENCHES`
+    wrench: str = word("body/servo_cf", "servo_cf")  # topic of the force
     # ros1 spells geometry_msgs/PoseStamped, ros2 geometry_msgs/msg/PoseStamped; auto tries both
-    types: str = "auto"
+    types: str = word("auto", "ros1", "ros2")
     axes: str = "-y+z-x"  # where right, up and towards the user lie in the axes of the arm's base
     # centre of the workspace: where the handle is while it is opened; base: the arm's own origin
-    origin: str = "here"
-    radius: float = 0.05  # m, of the workspace
-    force: float = 3.0  # N, the largest
-    delay: float = -1.0  # s, round trip through the bridge; negative measures it
-    state: float = 1.0  # 0 does without the arm's operating state
-    enable: float = 0.0  # 1 lets the driver enable the arm
-    home: float = 0.0  # 1 lets the driver home the arm: it moves by itself
-    gravity: float = 1.0  # 1 asks the arm to bear its own weight; 0 leaves that as it is
+    origin: str = word("here", "base")
+    radius: float = number(0.05, 0.0, LARGEST_RADIUS, above=True)  # m, of the workspace
+    force: float = number(3.0, 0.0, LARGEST_FORCE, above=True)  # N, the largest
+    delay: float = number(-1.0, most=LONGEST_DELAY)  # s, round trip through the bridge; negative measures it
+    state: float = switch(1.0)  # 0 does without the arm's operating state
+    enable: float = switch(0.0)  # 1 lets the driver enable the arm
+    home: float = switch(0.0)  # 1 lets the driver home the arm: it moves by itself
+    gravity: float = switch(1.0)  # 1 asks the arm to bear its own weight; 0 leaves that as it is
     # 1 asks an arm whose wrist is passive under a force to hold its orientation, as it is while it is opened
-    lock: float = 1.0
+    lock: float = switch(1.0)
     pedals: str = "footpedals"  # namespace of the console's pedals; empty for none
     clutch: str = "clutch"  # pedal that lets the handle move alone; empty for none
     # pedal that is the first button, the dead-man button where one is asked for; empty for none
     dead_man: str = "coag"
     # pedal that holds the body while pressed; empty: the hand always holds it. All other pedals stop the force
     hold: str = ""
-    wait: float = 0.0  # s, longest wait of a tick for a position
-    search: float = 2.0  # s to wait for the arm while opening
+    wait: float = number(0.0, 0.0, 1.0)  # s, longest wait of a tick for a position
+    search: float = number(2.0, 0.0, 60.0, above=True)  # s to wait for the arm while opening
 
     def __post_init__(self) -> None:
-        words = (
-            self.types in {"auto", "ros1", "ros2"}
-            and self.origin in {"here", "base"}
-            and self.wrench in WRENCHES
-        )
-        if not words:
-            raise UsageError(
-                "An option of crtk has a word that is not known.",
-                fix=f"types is auto, ros1 or ros2; origin is here or base; wrench is {' or '.join(WRENCHES)}.",
-            )
+        super().__post_init__()
         named = [pedal for pedal in (self.clutch, self.dead_man, self.hold) if pedal]
         if len(set(named)) < len(named) or not all("/" in pedal or pedal in PEDALS for pedal in named):
             raise UsageError(
                 "A pedal of crtk is not known, or has two meanings.",
                 fix=f"clutch, dead_man and hold are three of {', '.join(PEDALS)}, or topics with a slash, such as "
                 "console/operator_present.",
-            )
-        switches = (self.state, self.enable, self.home, self.gravity, self.lock)
-        if not (
-            all(value in {0.0, 1.0} for value in switches)
-            and 0.0 < self.radius <= LARGEST_RADIUS
-            and 0.0 < self.force <= LARGEST_FORCE
-            and self.delay <= LONGEST_DELAY
-            and 0.0 <= self.wait <= 1.0
-            and 0.0 < self.search <= 60.0
-        ):
-            raise UsageError(
-                "An option of crtk is out of range.",
-                why=f"radius is at most {LARGEST_RADIUS:g} m, force {LARGEST_FORCE:g} N, delay "
-                f"{LONGEST_DELAY:g} s, wait 1 s, search 60 s; state, enable, home, gravity and lock are 0 or 1.",
-                fix="For example crtk:ws://localhost:9090,arm=MTMR,radius=0.05,force=3.",
             )
         axes_in_words(self.axes)
 

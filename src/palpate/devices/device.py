@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from dataclasses import dataclass
+from typing import ClassVar, Protocol, Self
 
 import numpy as np
 
-from palpate.errors import DeviceError, UsageError
+from palpate.devices.device_options import settings_from
+from palpate.errors import DeviceError
 from palpate.network.shared_memory import Block
-from palpate.units import parse_quantity
 
 __all__ = [
     "ASSUMED_DAMPING",
@@ -31,7 +31,6 @@ __all__ = [
     "Traits",
     "free_buttons",
     "quantisation_noise",
-    "settings_from",
 ]
 
 HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised device gets zero force
@@ -235,23 +234,3 @@ def free_buttons(pressed: int, own: int) -> int:
         return pressed
     below = (1 << own) - 1
     return (pressed & below) | (pressed >> 1 & ~below)
-
-
-_Settings = TypeVar("_Settings")
-
-
-def settings_from(kind: type[_Settings], options: Mapping[str, str]) -> _Settings:
-    """Build a device's settings dataclass, whose fields are numbers or words, from texts."""
-    defaults = {f.name: f.default for f in fields(kind)}  # type: ignore[arg-type]
-    values: dict[str, Any] = {}
-    for name, text in options.items():
-        if name.startswith("ws:") and "url" in defaults:
-            name, text = "url", name
-        if name not in defaults:
-            raise UsageError(
-                f"The device has no option {name!r}.",
-                fix=f"Its options are {', '.join(defaults) or 'none'}.",
-            )
-        is_text = isinstance(defaults[name], str)
-        values[name] = text if is_text else parse_quantity(text, "", f"The device option {name}")
-    return kind(**values)

@@ -21,15 +21,7 @@ from palpate.devices.spacemouse import CONFIGURATION, INSTALL, SOCKET, VARIABLE,
 from palpate.devices.surroundings import Surroundings
 from palpate.devices.vendor_library import LibraryPlaces
 
-__all__ = [
-    "HARDWARE",
-    "Finding",
-    "GamepadSearch",
-    "LibrarySearch",
-    "PuckSearch",
-    "ServiceSearch",
-    "search",
-]
+__all__ = ["HARDWARE", "Finding", "GamepadSearch", "LibrarySearch", "PuckSearch", "ServiceSearch", "search"]
 
 
 @dataclass(frozen=True)

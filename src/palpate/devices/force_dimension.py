@@ -24,9 +24,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.devices.device import ASSUMED_DAMPING, UNPUBLISHED, Driver, Sample, Traits, free_buttons
+from palpate.devices.device_options import DeviceOptions, number, switch
 from palpate.devices.force_dimension_library import FORCES_OFF, LOST, DhdLibrary, Status
 from palpate.devices.profiles import DeviceProfile, device_profile, weakest_profile
-from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
+from palpate.errors import DeviceError, DeviceLostError, DeviceStopError
 
 __all__ = ["AXES", "TYPES", "WATCHDOG", "ForceDimensionDevice", "ForceDimensionSettings"]
 
@@ -53,31 +54,19 @@ _RETURNING, _BY_THE_USER = frozenset((2, 3)), frozenset((1, 6))  # causes of for
 
 
 @dataclass(frozen=True)
-class ForceDimensionSettings:
+class ForceDimensionSettings(DeviceOptions):
     """Settings of the connection."""
 
-    serial: float = 0.0  # number of the device; 0 takes the only one
+    driver = "forcedimension"
+    serial: float = number(0.0, 0.0, 65535.0, whole=True)  # number of the device; 0 takes the only one
     library: str = ""  # file of the vendor's library; empty looks for it
-    simulator: float = 0.0  # 1 lets the vendor's own simulator on this machine count as a device
-    home: float = 0.0  # 1 lets a device that needs it home itself: it moves by itself
-    gravity: float = 1.0  # 0 turns the compensation of the handle's weight off
-    mass: float = -1.0  # kg, mounted on the handle; negative keeps the device's own value
+    simulator: float = switch(0.0)  # 1 lets the vendor's own simulator on this machine count as a device
+    home: float = switch(0.0)  # 1 lets a device that needs it home itself: it moves by itself
+    gravity: float = switch(1.0)  # 0 turns the compensation of the handle's weight off
+    mass: float = number(-1.0, most=1.0)  # kg, mounted on the handle; negative keeps the device's own value
     # button, counted from 0, that works as a clutch; -1 for none. Of the others the first is the dead-man button where
     # one is asked for, and each stops the force else
-    clutch: float = -1.0
-
-    def __post_init__(self) -> None:
-        whole = all(map(float.is_integer, (self.serial, self.clutch)))
-        switches = all(value in {0.0, 1.0} for value in (self.simulator, self.home, self.gravity))
-        if not (
-            whole and switches and 0 <= self.serial <= 65535 and -1 <= self.clutch < 8 and self.mass < 1.0
-        ):
-            raise UsageError(
-                "An option of forcedimension is out of range.",
-                why="serial is 0 … 65535, clutch is a button 0 … 7 or -1, mass is below 1 kg, simulator, home and "
-                "gravity are 0 or 1.",
-                fix="For example forcedimension:serial=4711,home=1.",
-            )
+    clutch: float = number(-1.0, -1.0, 7.0, whole=True)
 
 
 class ForceDimensionDevice(Driver):

@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from palpate.devices.device import Driver, Sample, Traits
+from palpate.devices.device_options import DeviceOptions, number, switch, word
 from palpate.devices.steering import DeadZone, SteeredHand
-from palpate.errors import DeviceError, DeviceLostError, UsageError
+from palpate.errors import DeviceError, DeviceLostError
 
 __all__ = ["GamepadDevice", "GamepadSettings"]
 
@@ -41,29 +42,21 @@ _WEAKEST = 0.01  # of full: less is no rumble
 
 
 @dataclass(frozen=True)
-class GamepadSettings:
+class GamepadSettings(DeviceOptions):
     """Settings of the gamepad."""
 
+    driver = "gamepad"
     path: str = ""  # event file, such as /dev/input/event7; empty takes the only gamepad
-    mapping: str = "position"  # position or speed: what a stick sets of the hand
-    depth: str = "stick"  # stick or triggers: what moves the hand away from the user and back
+    mapping: str = word("position", "speed")  # position or speed: what a stick sets of the hand
+    # stick or triggers: what moves the hand away from the user and back
+    depth: str = word("stick", "triggers")
     # always, or button: the hand holds the body while the lower button (A, cross) is pressed
-    hold: str = "always"
-    dead: float = 0.15  # dead zone, as a share of the stick's way; where the pad's own is larger, that counts
-    speed: float = 0.08  # m/s of the hand at full stick, where the mapping is speed
-    rumble: float = 1.0  # 0 does without rumble
-
-    def __post_init__(self) -> None:
-        words = (self.mapping, self.depth, self.hold)
-        known = zip(words, (("position", "speed"), ("stick", "triggers"), ("always", "button")), strict=True)
-        numbers = 0.0 <= self.dead <= 0.5 and 0.0 < self.speed <= 1.0 and self.rumble in {0.0, 1.0}
-        if not (all(word in choice for word, choice in known) and numbers):
-            raise UsageError(
-                "An option of gamepad is out of range.",
-                why="mapping is position or speed, depth is stick or triggers, hold is always or button; dead is "
-                "0 … 0.5, speed is above 0 and at most 1 m/s, rumble is 0 or 1.",
-                fix="For example gamepad:mapping=speed,depth=triggers.",
-            )
+    hold: str = word("always", "button")
+    # dead zone, as a share of the stick's way; where the pad's own is larger, that counts
+    dead: float = number(0.15, 0.0, 0.5)
+    # m/s of the hand at full stick, where the mapping is speed
+    speed: float = number(0.08, 0.0, 1.0, above=True)
+    rumble: float = switch(1.0)  # 0 does without rumble
 
 
 class GamepadDevice(Driver):

@@ -26,6 +26,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from palpate.devices.device import ASSUMED_DAMPING, UNPUBLISHED, Driver, Sample, Traits, free_buttons
+from palpate.devices.device_options import DeviceOptions, number, word
 from palpate.devices.haply_frames import (
     OLD_HTTP_PORT,
     ask_scale,
@@ -38,7 +39,7 @@ from palpate.devices.haply_frames import (
 )
 from palpate.devices.profiles import PROFILES, DeviceProfile
 from palpate.devices.websocket_channel import WebsocketChannel
-from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
+from palpate.errors import DeviceError, DeviceLostError, DeviceStopError
 
 __all__ = ["AXES", "HaplyDevice", "HaplySettings"]
 
@@ -60,41 +61,29 @@ _STOPS = frozenset(
 
 
 @dataclass(frozen=True)
-class HaplySettings:
+class HaplySettings(DeviceOptions):
     """Settings of the connection."""
 
+    driver = "haply"
     url: str = "ws://localhost:10001"  # address of the simulation channel
     device: str = ""  # four-digit id of the device; empty takes the only one
     # port of the service's HTTP interface; 0 tries that of the channel, as of version 3.5, then 10000
-    http: float = 0.0
+    http: float = number(0.0, 0.0, 65535.0, whole=True)
     # port of the event channel, as of version 3.5; 0 does without the service's safety events
-    events: float = 10020.0
-    spelling: str = "auto"  # of a force: vector, values, or auto, which finds it out by the echoed force
+    events: float = number(10020.0, 0.0, 65535.0, whole=True)
+    # of a force: vector, values, or auto, which finds it out by the echoed force
+    spelling: str = word("auto", *SPELLINGS)
     # refuse or compensate: answer to a service that scales forces by a factor other than 1
-    scale: str = "refuse"
+    scale: str = word("refuse", "compensate")
     # factor of a service that doesn't tell it, as before version 3.5; 0 refuses such a service. What the service tells
     # goes before
-    force_scale: float = 0.0
+    force_scale: float = number(0.0, 0.1, 10.0, also=0.0)
     grip: str = ""  # id of the grip whose buttons count; empty: those of all
     # button that is the hand, such as a of a wireless grip or button of a wired one: it holds the body only while the
     # button is pressed. Empty: it always holds. Of the others the first is the dead-man button where one is asked for
     hold: str = ""
-    wait: float = 0.0002  # s, longest wait for an outstanding answer
-    search: float = 2.0  # s to look for a device
-
-    def __post_init__(self) -> None:
-        if self.spelling not in {"auto", *SPELLINGS} or self.scale not in {"refuse", "compensate"}:
-            raise UsageError(
-                f"Haply has no spelling {self.spelling!r} or no way with a scale {self.scale!r}.",
-                fix="Choose spelling=auto, vector or values, and scale=refuse or compensate.",
-            )
-        ports = all(port.is_integer() and 0.0 <= port <= 65535.0 for port in (self.http, self.events))
-        scale = self.force_scale == 0.0 or 0.1 <= self.force_scale <= 10.0
-        if not (ports and scale and 0.0 <= self.wait <= 1.0 and 0.0 <= self.search <= 60.0):
-            raise UsageError(
-                "A port, wait, search or force_scale of haply is out of range.",
-                fix="Ports are 0 … 65535, wait is 0 … 1 s, search is 0 … 60 s, force_scale is 0.1 … 10, or 0.",
-            )
+    wait: float = number(0.0002, 0.0, 1.0)  # s, longest wait for an outstanding answer
+    search: float = number(2.0, 0.0, 60.0)  # s to look for a device
 
 
 class HaplyDevice(Driver):

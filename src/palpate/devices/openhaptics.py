@@ -31,6 +31,7 @@ from palpate.devices.device import (
     Traits,
     free_buttons,
 )
+from palpate.devices.device_options import DeviceOptions, number, word
 from palpate.devices.openhaptics_library import LOST, NO_DEVICE, Code, HdError, HdLibrary
 from palpate.devices.openhaptics_servo import (
     CAUSE,
@@ -46,7 +47,7 @@ from palpate.devices.openhaptics_servo import (
     servo,
 )
 from palpate.devices.profiles import DeviceProfile, device_profile, weakest_profile
-from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, UsageError
+from palpate.errors import DeviceError, DeviceLostError, DeviceStopError
 
 __all__ = ["AXES", "OpenHapticsDevice", "OpenHapticsSettings"]
 
@@ -66,28 +67,25 @@ _MM = 1e-3
 
 
 @dataclass(frozen=True)
-class OpenHapticsSettings:
+class OpenHapticsSettings(DeviceOptions):
     """Settings of the connection."""
 
-    device: str = "Default Device"  # name of the device in the vendor's configuration
+    driver = "openhaptics"
+    device: str = word("Default Device")  # name of the device in the vendor's configuration
     library: str = ""  # file of the vendor's library; empty looks for it
     rate: float = 1000.0  # Hz, frames of the library's scheduler; 500 or 1000
     # button, 1 to 4, that works as a clutch; 0 for none. Of the others the first is the dead-man button where one is
     # asked for, and each stops the force else
-    clutch: float = 0.0
-    inkwell: str = "rest"  # rest or ignore: whether a stylus that stands in its inkwell lets go of the body
-    switch: str = "ignore"  # ignore, or hold: the force acts only while the device's safety switch is active
+    clutch: float = number(0.0, 0.0, _BUTTONS, whole=True)
+    # rest or ignore: whether a stylus that stands in its inkwell lets go of the body
+    inkwell: str = word("rest", "ignore")
+    # ignore, or hold: the force acts only while the device's safety switch is active
+    switch: str = word("ignore", "hold")
 
     def __post_init__(self) -> None:
-        words = self.inkwell in {"rest", "ignore"} and self.switch in {"ignore", "hold"}
-        numbers = self.rate in {500.0, 1000.0} and self.clutch in set(range(_BUTTONS + 1))
-        if not (words and numbers and self.device):
-            raise UsageError(
-                "An option of openhaptics is out of range.",
-                why="rate is 500 or 1000 Hz, clutch a button 1 … 4 or 0, inkwell is rest or ignore, switch is ignore "
-                "or hold.",
-                fix="For example openhaptics:clutch=2.",
-            )
+        super().__post_init__()
+        if self.rate not in {500.0, 1000.0}:
+            raise self.refusal(f"rate={self.rate:g}", "It is 500 or 1000 Hz.")
 
 
 class OpenHapticsDevice(Driver):

@@ -26,11 +26,12 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import cfunc, njit, types
+from numba import cfunc, types
 from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
 from palpate.devices.openhaptics_library import DONE, GOING_ON, Code
+from palpate.kernels import part
 
 __all__ = [
     "CAUSE",
@@ -50,7 +51,6 @@ __all__ = [
 FIRST = 50  # frames at the start whose places and velocities are kept
 SILENCE = 1.0  # cause of a stop: the loop was silent; all others are the library's errors
 _extension: Any = intrinsic  # whose own types know nothing of the typing context that it takes away
-_jit = njit(cache=True, error_model="numpy")
 _POSITION, _VELOCITY, _FORCE = Code.POSITION, Code.VELOCITY, Code.FORCE
 _BUTTONS, _INKWELL, _SWITCH = Code.BUTTONS, Code.INKWELL, Code.SAFETY_SWITCH
 _MOST_ERRORS = 64  # a list that is longer doesn't end
@@ -113,31 +113,25 @@ class Mailbox:
         return self.cells[EARLY:].reshape(FIRST, 6)
 
 
-def _call(context: Any, builder: Any, result: Any, address: Any, arguments: list[Any]) -> Any:
-    kind = ir.FunctionType(result, [argument.type for argument in arguments])
-    return builder.call(builder.inttoptr(address, kind.as_pointer()), arguments)
+def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    """Call what lies at the address that is the first argument, with the others."""
+    returns = signature.return_type != types.void
+    result = ir.IntType(64) if returns else ir.VoidType()
+    kind = ir.FunctionType(result, [argument.type for argument in args[1:]])
+    value = builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
+    return value if returns else context.get_dummy_value()
 
 
 @_extension
 def _frame(typingctx: Any, address: Any, device: Any) -> Any:
     """Call ``void f(unsigned int)`` at an address."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        _call(context, builder, ir.VoidType(), args[0], [args[1]])
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.uint32), generate
+    return types.void(types.int64, types.uint32), _call
 
 
 @_extension
 def _transfer(typingctx: Any, address: Any, code: Any, place: Any) -> Any:
     """Call ``void f(unsigned int, void *)`` at an address."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        _call(context, builder, ir.VoidType(), args[0], [args[1], args[2]])
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.uint32, types.int64), generate
+    return types.void(types.int64, types.uint32, types.int64), _call
 
 
 @_extension
@@ -147,22 +141,13 @@ def _returned(typingctx: Any, address: Any) -> Any:
     A structure of twelve bytes comes back in two registers (System V and Arm calling conventions); the first holds
     the first two of its three numbers.
     """
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _call(context, builder, ir.IntType(64), args[0], [])
-
-    return types.uint64(types.int64), generate
+    return types.uint64(types.int64), _call
 
 
 @_extension
 def _hidden(typingctx: Any, address: Any, place: Any) -> Any:
     """Call a function that writes what it returns to a place (64-bit Windows)."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        _call(context, builder, ir.VoidType(), args[0], [args[1]])
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.int64), generate
+    return types.void(types.int64, types.int64), _call
 
 
 @functools.cache
@@ -171,7 +156,7 @@ def servo() -> Any:
     return cfunc(types.uint32(types.voidptr), cache=True)(_called)
 
 
-@_jit
+@part
 def _choose_force(box, written, x, y, z):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Take a force that was written whole, and zero where the loop is silent or has not answered to a stop."""
     if written == box[WRITTEN] and written % 2.0 == 0.0:
@@ -188,7 +173,7 @@ def _choose_force(box, written, x, y, z):  # type: ignore[no-untyped-def]  # noq
         box[PUSH], box[PUSH + 1], box[PUSH + 2] = 0.0, 0.0, 0.0
 
 
-@_jit
+@part
 def _take_errors(box, words):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Take all errors of the library, the newest first; returns whether another frame may be begun."""
     may_begin, stopped = True, False

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.devices.device import Driver, Sample, Traits, settings_from
+from palpate.devices.device import Driver, Sample, Traits
+from palpate.devices.device_options import settings_from
 from palpate.network.shared_memory import Block
 
 __all__ = ["FrameInterpolator", "PageDevice", "page_patience"]

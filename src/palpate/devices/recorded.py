@@ -13,26 +13,21 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.devices.device import Sample, ScriptedHand, Traits, settings_from
+from palpate.devices.device import Sample, ScriptedHand, Traits
+from palpate.devices.device_options import DeviceOptions, number, settings_from, switch, word
 from palpate.errors import UsageError
 
 __all__ = ["RecordedHand", "RecordedSettings"]
 
 
 @dataclass(frozen=True)
-class RecordedSettings:
+class RecordedSettings(DeviceOptions):
     """Settings of a recorded hand."""
 
-    file: str = ""  # the recorded touch
-    speed: float = 1.0  # times as fast as it was recorded
-    repeat: float = 0.0  # 1 begins again at the end; with 0 the hand lets go there
-
-    def __post_init__(self) -> None:
-        if not (self.file and 0.0 < self.speed <= 100.0):
-            raise UsageError(
-                "A recorded hand needs the file of a recorded touch, and a positive speed.",
-                fix="For example trace:file=touch.trace,speed=1; palpate run --record FILE records one.",
-            )
+    driver = "trace"
+    file: str = word("", meaning="the file of a recorded touch, as palpate run --record FILE writes it")
+    speed: float = number(1.0, 0.0, 100.0, above=True)  # times as fast as it was recorded
+    repeat: float = switch(0.0)  # 1 begins again at the end; with 0 the hand lets go there
 
 
 class RecordedHand(ScriptedHand):

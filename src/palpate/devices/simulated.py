@@ -16,11 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 
 from palpate.devices.device import Driver, Sample, Traits
+from palpate.devices.device_options import DeviceOptions, number, word
 from palpate.devices.profiles import device_profile
 from palpate.errors import UsageError
+from palpate.kernels import kernel, part
 
 __all__ = ["SimulatedHand", "SimulatedSettings"]
 
@@ -34,56 +35,43 @@ _WAVES = 6  # of the random script: tremor has 8 to 12 Hz, voluntary motion ends
 _SLOWEST, _FASTEST = 0.2, 8.0  # Hz, of the random script's waves
 _RISE = 0.2  # s, of a press
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
-
 
 @dataclass(frozen=True)
-class SimulatedSettings:
+class SimulatedSettings(DeviceOptions):
     """Settings of the hand, of the device in it, and of the script."""
 
-    mass: float = 0.3  # kg, of device and hand together
-    damping: float = 0.5  # N·s/m, the device's own b
-    friction: float = 0.0  # N, the device's Coulomb friction
-    grip: float = 300.0  # N/m, the hand's spring
-    grip_damping: float = 5.0  # N·s/m, the hand's damper
-    step: float = 0.0  # m, of the encoder; 0 for none
-    noise: float = 0.0  # m, standard deviation of what is read, along one axis; 0 for none
-    delay: float = 0.0  # s, age of what is read, at most 0.015
+    driver = "simulated"
+    mass: float = number(0.3, 0.0, above=True)  # kg, of device and hand together
+    damping: float = number(0.5, 0.0)  # N·s/m, the device's own b
+    friction: float = number(0.0, 0.0)  # N, the device's Coulomb friction
+    grip: float = number(300.0, 0.0)  # N/m, the hand's spring
+    grip_damping: float = number(5.0, 0.0)  # N·s/m, the hand's damper
+    step: float = number(0.0, 0.0)  # m, of the encoder; 0 for none
+    noise: float = number(0.0, 0.0)  # m, standard deviation of what is read, along one axis; 0 for none
+    delay: float = number(0.0, 0.0, _LONGEST_DELAY)  # s, age of what is read, at most 0.015
     # s by up to which what is read is older still, evenly distributed; its time doesn't say so
-    jitter: float = 0.0
+    jitter: float = number(0.0, 0.0, _LONGEST_DELAY)
     # where the hand wants to be. sine: A sin 2πft along the direction; press: A within 0.2 s, and stay; random: A times
     # smooth noise in all directions about 0.6 A; adversarial: A and 0.2 A by turns, whichever way it already moves, in
     # order to shake
-    shape: str = "sine"
-    amplitude: float = 0.03  # A, m
-    frequency: float = 0.5  # f, Hz, of the sine
-    x: float = 0.0  # direction, normalised, with y and z
-    y: float = -1.0
-    z: float = 0.0
-    seed: float = 0.0  # of the random script; a whole number
+    shape: str = word(*_SHAPES)
+    amplitude: float = number(0.03)  # A, m
+    frequency: float = number(0.5)  # f, Hz, of the sine
+    x: float = number(0.0)  # direction, normalised, with y and z
+    y: float = number(-1.0)
+    z: float = number(0.0)
+    seed: float = number(0.0, 0.0)  # of the random script; a whole number
     profile: str = "omega.3"  # device whose workspace and limits it has; see `profiles.PROFILES`
     file: str = ""  # recorded touch whose hand it follows over and over, instead of `shape`
 
     def __post_init__(self) -> None:
-        if self.shape not in _SHAPES:
-            raise UsageError(
-                f"There is no script of shape {self.shape!r}.", fix=f"Choose one of {', '.join(_SHAPES)}."
-            )
-        not_negative = (self.damping, self.friction, self.grip, self.grip_damping, self.step, self.noise, self.jitter,
-                        self.delay, self.seed)  # fmt: skip
-        numbers = (self.mass, *not_negative, self.amplitude, self.frequency, self.x, self.y, self.z)
-        if not (
-            all(map(math.isfinite, numbers))
-            and math.hypot(self.x, self.y, self.z) > 0.0
-            and self.mass > 0.0
-            and min(not_negative) >= 0.0
-            and self.delay + self.jitter <= _LONGEST_DELAY
-        ):
-            raise UsageError(
-                "No hand can be simulated with these settings.",
-                why="A mass is positive, dampers, springs, steps and noise are not negative, delay and jitter are "
-                f"{1e3 * _LONGEST_DELAY:g} ms at most, and a direction is not zero.",
-                fix="For example simulated:mass=0.3,damping=0.5,grip=300,delay=0.002,y=-1.",
+        super().__post_init__()
+        if not math.hypot(self.x, self.y, self.z) > 0.0:
+            raise self.refusal("x=0,y=0,z=0", "A direction is not zero, for example y=-1.")
+        if self.delay + self.jitter > _LONGEST_DELAY:
+            raise self.refusal(
+                f"delay={self.delay:g},jitter={self.jitter:g}",
+                f"Both together are {_LONGEST_DELAY:g} s at most.",
             )
 
 
@@ -204,7 +192,7 @@ def _recorded_path(file: str) -> np.ndarray:
     return np.column_stack([trace.time - trace.time[0], trace.ticks["hand"]])
 
 
-@_jit
+@part
 def _scripted(shape, time, i, toward, along, amplitude, frequency, frequencies, phases):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     if shape == 0:
         return amplitude * along[i] * math.sin(2.0 * math.pi * frequency * time)
@@ -218,7 +206,7 @@ def _scripted(shape, time, i, toward, along, amplitude, frequency, frequencies, 
     return amplitude * along[i] * (1.0 if toward >= 0.0 else 0.2)
 
 
-@_jit
+@part
 def _recorded(time, i, path):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     since = time % path[-1, 0]
     row = min(np.searchsorted(path[:, 0], since, side="right") - 1, len(path) - 2)
@@ -226,7 +214,7 @@ def _recorded(time, i, path):  # type: ignore[no-untyped-def]  # noqa: ANN001, A
     return path[row, 1 + i] + share * (path[row + 1, 1 + i] - path[row, 1 + i])
 
 
-@_jit
+@kernel
 def _integrate(place, velocity, push, clock, span, shape, along, figures, frequencies, phases, path):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     mass, damper, friction, grip, amplitude, frequency, radius = figures
     count = max(1, math.ceil(span / _STEP))
@@ -262,7 +250,7 @@ def _integrate(place, velocity, push, clock, span, shape, along, figures, freque
                 velocity[i] = 0.0
 
 
-@_jit
+@kernel
 def _delayed(past, count, seen, step, error, position):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     newest = (count - 1) % _PAST
     k, older = newest, newest

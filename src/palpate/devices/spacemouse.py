@@ -30,8 +30,9 @@ from pathlib import Path
 import numpy as np
 
 from palpate.devices.device import Driver, Sample, Traits, free_buttons
+from palpate.devices.device_options import DeviceOptions, number, word
 from palpate.devices.steering import DeadZone, SteeredHand
-from palpate.errors import DeviceError, DeviceLostError, UsageError
+from palpate.errors import DeviceError, DeviceLostError
 
 __all__ = [
     "CONFIGURATION",
@@ -61,29 +62,25 @@ _FEWEST_BUTTONS = 2  # that any puck has
 
 
 @dataclass(frozen=True)
-class SpaceMouseSettings:
+class SpaceMouseSettings(DeviceOptions):
     """Settings of the puck."""
 
+    driver = "spacemouse"
     socket: str = ""  # the daemon's; empty looks for it
-    mapping: str = "speed"  # speed or position: what the puck's deflection sets of the hand
-    speed: float = 0.08  # m/s of the hand at full deflection, where the mapping is speed
-    full: float = 350.0  # counts that the daemon reports at full deflection
-    dead: float = 0.1  # dead zone, as a share of the full deflection
-    centre: float = 2.0  # number of the button that brings the hand back to the centre, from 1; 0 for none
+    mapping: str = word("speed", "position")  # speed or position: what the puck's deflection sets of the hand
+    # m/s of the hand at full deflection, where the mapping is speed
+    speed: float = number(0.08, 0.0, 1.0, above=True)
+    full: float = number(350.0, 10.0, 32768.0)  # counts that the daemon reports at full deflection
+    dead: float = number(0.1, 0.0, 0.5)  # dead zone, as a share of the full deflection
+    # number of the button that brings the hand back to the centre, from 1; 0 for none
+    centre: float = number(2.0, 0.0, 32.0, whole=True)
     # number of the button that holds the body while pressed, from 1; 0: the hand always holds it
-    hold: float = 0.0
+    hold: float = number(0.0, 0.0, 32.0, whole=True)
 
     def __post_init__(self) -> None:
-        buttons = all(0.0 <= value <= 32.0 and value == int(value) for value in (self.centre, self.hold))
-        numbers = 0.0 < self.speed <= 1.0 and 10.0 <= self.full <= 32768.0 and 0.0 <= self.dead <= 0.5
-        good = self.mapping in {"speed", "position"} and numbers and buttons
-        if not good or (self.hold and self.hold == self.centre):
-            raise UsageError(
-                "An option of spacemouse is out of range.",
-                why="mapping is speed or position; speed is above 0 and at most 1 m/s, full 10 … 32768 counts, dead "
-                "0 … 0.5; centre and hold are two buttons by their numbers, 1 … 32, or 0.",
-                fix="For example spacemouse:speed=0.05,hold=1.",
-            )
+        super().__post_init__()
+        if self.hold and self.hold == self.centre:
+            raise self.refusal(f"hold={self.hold:g}", "It is another button than centre.")
 
 
 def sockets(environment: Mapping[str, str], configuration: str) -> tuple[str, ...]:

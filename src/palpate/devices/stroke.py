@@ -12,35 +12,32 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.devices.device import Sample, ScriptedHand, Traits
-from palpate.errors import DeviceError, UsageError
+from palpate.devices.device_options import DeviceOptions, number, word
+from palpate.errors import DeviceError
 
 __all__ = ["StrokeDevice", "StrokeSettings"]
 
 
 @dataclass(frozen=True)
-class StrokeSettings:
+class StrokeSettings(DeviceOptions):
     """Settings of the script."""
 
-    amplitude: float = 0.03  # A, m
-    frequency: float = 0.5  # f, Hz
-    x: float = 0.0  # direction, normalised, with y and z
-    y: float = -1.0
-    z: float = 0.0
-    shape: str = "sine"  # sine: A sin 2πft; ramp: the triangle through the same zeros and peaks
+    driver = "stroke"
+    amplitude: float = number(0.03)  # A, m
+    frequency: float = number(0.5)  # f, Hz
+    x: float = number(0.0)  # direction, normalised, with y and z
+    y: float = number(-1.0)
+    z: float = number(0.0)
+    shape: str = word("sine", "ramp")  # sine: A sin 2πft; ramp: the triangle through the same zeros and peaks
     stall_at: float = math.inf  # s after the first reading at which the samples stop
     nan_at: float = math.inf  # s after it at which they turn into NaN
     fail_at: float = math.inf  # s after it at which reading raises
     lasting: float = math.inf  # s, duration of each of these
 
     def __post_init__(self) -> None:
-        if self.shape not in {"sine", "ramp"}:
-            raise UsageError(f"There is no stroke of shape {self.shape!r}.", fix="Choose sine or ramp.")
-        numbers = (self.amplitude, self.frequency, self.x, self.y, self.z)
-        if not (all(map(math.isfinite, numbers)) and math.hypot(self.x, self.y, self.z) > 0.0):
-            raise UsageError(
-                "A stroke needs a finite amplitude and frequency and a direction that is not zero.",
-                fix="For example stroke:amplitude=0.03,frequency=0.5,y=-1.",
-            )
+        super().__post_init__()
+        if not math.hypot(self.x, self.y, self.z) > 0.0:
+            raise self.refusal("x=0,y=0,z=0", "A direction is not zero, for example y=-1.")
 
 
 class StrokeDevice(ScriptedHand):

@@ -56,14 +56,56 @@ def open_instance(
 
     Its log is dropped by default: places outside the trained range are asked for here, and the FMU warns of them.
     """
-    kind = _Instance2 if description.fmiVersion == "2.0" else _Instance3
-    return kind(description, folder, log, exchange=exchange)
+    return _Instance(description, folder, log, exchange=exchange)
 
 
 class _Instance:
-    """An instance as both versions have it: calls of the same name in FMPy."""
+    """An instance through FMPy; `FmuInstance` tells what its methods do."""
 
-    fmu: Any
+    def __init__(self, description: Any, folder: str, log: Callable[..., None], *, exchange: bool) -> None:
+        identity = _identity(description, folder, exchange=exchange)
+        self._former = description.fmiVersion == "2.0"
+        if self._former:
+            from fmpy.fmi2 import (
+                FMU2Model,
+                FMU2Slave,
+                defaultCallbacks,
+                fmi2CallbackFunctions,
+                fmi2CallbackLoggerTYPE,
+            )
+
+            calls = fmi2CallbackFunctions()
+            calls.logger = fmi2CallbackLoggerTYPE(log)
+            calls.allocateMemory = defaultCallbacks.allocateMemory
+            calls.freeMemory = defaultCallbacks.freeMemory
+            self._calls = calls  # as long as the instance may use them
+            self.fmu: Any = (FMU2Model if exchange else FMU2Slave)(**identity)
+            self.fmu.instantiate(callbacks=calls)
+        else:
+            from fmpy.fmi3 import FMU3Model, FMU3Slave
+
+            self.fmu = (FMU3Model if exchange else FMU3Slave)(**identity)
+            self.fmu.instantiate(logMessage=log)
+
+    def begin(self, *, again: bool = True) -> None:
+        if again:
+            self.fmu.reset()
+        if self._former:
+            self.fmu.setupExperiment(startTime=0.0)
+            self.fmu.enterInitializationMode()
+        else:
+            self.fmu.enterInitializationMode(startTime=0.0)
+        self.fmu.exitInitializationMode()
+
+    def write(self, references: list[int], values: list[float]) -> None:
+        (self.fmu.setReal if self._former else self.fmu.setFloat64)(references, values)
+
+    def read(self, references: list[int]) -> list[float]:
+        return list((self.fmu.getReal if self._former else self.fmu.getFloat64)(references))
+
+    def flags(self) -> list[bool]:
+        # in version 2.0 Booleans have numbers of their own
+        return [bool(flag) for flag in self.fmu.getBoolean([0, 1, 2] if self._former else [12, 13, 14])]
 
     def step(self, time: float, dt: float) -> None:
         self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=dt)
@@ -74,67 +116,6 @@ class _Instance:
     def close(self) -> None:
         self.fmu.terminate()
         self.fmu.freeInstance()
-
-
-class _Instance2(_Instance):
-    """An instance of FMI 2.0, see `FmuInstance`."""
-
-    def __init__(self, description: Any, folder: str, log: Callable[..., None], *, exchange: bool) -> None:
-        from fmpy.fmi2 import (
-            FMU2Model,
-            FMU2Slave,
-            defaultCallbacks,
-            fmi2CallbackFunctions,
-            fmi2CallbackLoggerTYPE,
-        )
-
-        self._calls = fmi2CallbackFunctions()
-        self._calls.logger = fmi2CallbackLoggerTYPE(log)
-        self._calls.allocateMemory = defaultCallbacks.allocateMemory
-        self._calls.freeMemory = defaultCallbacks.freeMemory
-        self.fmu = (FMU2Model if exchange else FMU2Slave)(**_identity(description, folder, exchange=exchange))
-        self.fmu.instantiate(callbacks=self._calls)
-
-    def begin(self, *, again: bool = True) -> None:
-        if again:
-            self.fmu.reset()
-        self.fmu.setupExperiment(startTime=0.0)
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
-
-    def write(self, references: list[int], values: list[float]) -> None:
-        self.fmu.setReal(references, values)
-
-    def read(self, references: list[int]) -> list[float]:
-        return list(self.fmu.getReal(references))
-
-    def flags(self) -> list[bool]:
-        return [bool(flag) for flag in self.fmu.getBoolean([0, 1, 2])]
-
-
-class _Instance3(_Instance):
-    """An instance of FMI 3.0, see `FmuInstance`."""
-
-    def __init__(self, description: Any, folder: str, log: Callable[..., None], *, exchange: bool) -> None:
-        from fmpy.fmi3 import FMU3Model, FMU3Slave
-
-        self.fmu = (FMU3Model if exchange else FMU3Slave)(**_identity(description, folder, exchange=exchange))
-        self.fmu.instantiate(logMessage=log)
-
-    def begin(self, *, again: bool = True) -> None:
-        if again:
-            self.fmu.reset()
-        self.fmu.enterInitializationMode(startTime=0.0)
-        self.fmu.exitInitializationMode()
-
-    def write(self, references: list[int], values: list[float]) -> None:
-        self.fmu.setFloat64(references, values)
-
-    def read(self, references: list[int]) -> list[float]:
-        return list(self.fmu.getFloat64(references))
-
-    def flags(self) -> list[bool]:
-        return [bool(flag) for flag in self.fmu.getBoolean([12, 13, 14])]
 
 
 def _identity(description: Any, folder: str, *, exchange: bool) -> dict[str, str]:

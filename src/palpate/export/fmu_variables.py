@@ -95,43 +95,33 @@ def _inputs(surrogate: Surrogate) -> list[Variable]:
 
 
 def _parameters(surrogate: Surrogate) -> list[Variable]:
-    scale = Variable(
-        "force_scale", "factor of forces and energies", SCALE, "parameter", "tunable", "1", start=1.0
+    damping = (
+        "damping of the hand within a contact, by its velocity from step to step; of co-simulation alone"
     )
-    damping = Variable(
-        "damping",
-        "damping of the hand within a contact, by its velocity from step to step; of co-simulation alone",
-        DAMPING,
-        "parameter",
-        "tunable",
-        "N.s/m",
-        start=0.0,
-        low=0.0,
-    )
-    mass = Variable(
-        "mass",
-        "mass that the force moves, by which steps are judged to be too long; 0 for no warning",
-        MASS,
-        "parameter",
-        "tunable",
-        "kg",
-        start=LIGHT,
-        low=0.0,
-    )
-    return [scale, damping, mass] + [
-        Variable(
-            identifier(r.name),
-            r.name,
-            PARAMETER + i,
-            "parameter",
-            "tunable",
-            r.unit or "1",
-            start=(r.low + r.high) / 2,
-            low=r.low,
-            high=r.high,
-        )
-        for i, r in enumerate(surrogate.parameters)
+    mass = "mass that the force moves, by which steps are judged to be too long; 0 for no warning"
+    return [
+        _parameter("force_scale", "factor of forces and energies", SCALE, "1", 1.0),
+        _parameter("damping", damping, DAMPING, "N.s/m", 0.0, 0.0),
+        _parameter("mass", mass, MASS, "kg", LIGHT, 0.0),
+        *(
+            _parameter(
+                identifier(r.name), r.name, PARAMETER + i, r.unit or "1", (r.low + r.high) / 2, r.low, r.high
+            )
+            for i, r in enumerate(surrogate.parameters)
+        ),
     ]
+
+
+def _parameter(
+    name: str,
+    words: str,
+    reference: int,
+    unit: str,
+    start: float,
+    low: float | None = None,
+    high: float | None = None,
+) -> Variable:
+    return Variable(name, words, reference, "parameter", "tunable", unit, start=start, low=low, high=high)
 
 
 def _outputs(surrogate: Surrogate) -> list[Variable]:

@@ -20,6 +20,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.files import write_file
 from palpate.output_files import require_outputs
+from palpate.surrogates.fields.surface_interpolation import node_normals
 
 __all__ = ["MOST_TARGETS", "ShapeSeries", "glb_bytes", "write_glb"]
 
@@ -171,13 +172,9 @@ def _turn_upright(vectors: np.ndarray) -> np.ndarray:
 
 def _normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Return unit normals (P, 3) at the nodes, weighted by area; up where no triangle is."""
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    faces = np.cross(b - a, c - a)
-    sums = np.zeros_like(points)
-    for k in range(3):
-        np.add.at(sums, triangles[:, k], faces)
-    length = np.linalg.norm(sums, axis=1, keepdims=True)
-    return np.where(length > 0, sums / np.where(length > 0, length, 1.0), [0.0, 1.0, 0.0])
+    normals = node_normals(points, triangles)
+    normals[~normals.any(axis=1)] = [0.0, 1.0, 0.0]
+    return normals
 
 
 def _keyframes(count: int, seconds: float) -> tuple[np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ form see `palpate.surrogates.energy_kernels`; beyond the trained ranges see `pal
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +23,7 @@ from palpate.export.onnx_surface import Distance, distance_to
 from palpate.surrogates.baselines import ConstantBaseline, ContactBaseline, PadBaseline
 from palpate.surrogates.energy import LearntEnergy
 
-__all__ = ["BODY_OUTPUTS", "add_body"]
+__all__ = ["BODY_OUTPUTS", "BaselineForm", "Touch", "add_body", "onnx_form"]
 
 SLACK = 1e-9  # share of a range: round-off at its edge is still inside, as in the compiled kernels
 STEP = 1e-3  # step over the probe's radius, of the difference for the third derivative of the distance
@@ -30,7 +31,7 @@ BODY_OUTPUTS = ("energy", "force", "stiffness", "amplitude", "slope", "depth", "
 
 
 @dataclass(frozen=True)
-class _Known:
+class BaselineForm:
     """A baseline at a place: its energy with derivatives, and the signed root."""
 
     energy: Value  # U₀ (N, 1)
@@ -41,7 +42,7 @@ class _Known:
 
 
 @dataclass(frozen=True)
-class _Touch:
+class Touch:
     """A probe at a surface: its depth, and how far that is beyond training."""
 
     distance: Distance  # to the surface, of any places
@@ -68,7 +69,7 @@ def add_body(graph: Graph, energy: LearntEnergy) -> None:
     place = X.columns(0, k) if k == 3 else X.columns(0, k) @ D
 
     graph.stage = "surface"
-    touch = _touch(graph, energy, X, place) if isinstance(baseline, ContactBaseline) else None
+    touch = _touch(graph, energy, X, place) if baseline.surface is not None else None
     asked = place if touch is None else place + touch.excess * touch.normal
     graph.stage = "ranges"
     felt = asked if k == 3 else asked @ D.T
@@ -80,7 +81,7 @@ def add_body(graph: Graph, energy: LearntEnergy) -> None:
     graph.stage = "network"
     slopes = network_slopes(graph, net, xi, k)
     graph.stage = "baseline"
-    known = _known(graph, energy, place, touch, xi)
+    known = onnx_form(baseline, graph, place, touch, xi)
     if isinstance(baseline, PadBaseline):
         slopes = _with_polynomial(graph, baseline, xi, half, slopes, k)
     graph.stage = "slopes"
@@ -118,35 +119,28 @@ def _box(graph: Graph, energy: LearntEnergy, line: Value) -> tuple[Value, Value,
     return value, graph.where(below, lower[1], upper[1]), graph.where(below, -lower[2], upper[2])
 
 
-def _touch(graph: Graph, energy: LearntEnergy, X: Value, place: Value) -> _Touch:
+def _touch(graph: Graph, energy: LearntEnergy, X: Value, place: Value) -> Touch:
     """Return how deep the probe is in the surface at rest, and the saturated depth at which ℓ is asked."""
-    baseline = energy.baseline
-    assert isinstance(baseline, ContactBaseline)
-    at = baseline.radius_at
-    radius: Any = baseline.probe_radius if at is None else X.columns(at, at + 1)
-    distance = distance_to(graph, baseline.touched)
+    baseline, at = energy.baseline, energy.baseline.radius_input
+    assert baseline.surface is not None
+    radius: Any = baseline.radius if at is None else X.columns(at, at + 1)
+    distance = distance_to(graph, baseline.surface)
     d, normal, bend = distance(place)
     s = radius - d
     contact = s > 0.0
     if not math.isfinite(energy.going.deepest):
         zero = s * 0.0
-        return _Touch(distance, s, contact, normal, bend, zero, zero + 1.0, zero)
+        return Touch(distance, s, contact, normal, bend, zero, zero + 1.0, zero)
     held, slope, curvature = _saturated(graph, s, energy.going.deepest, energy.going.depth_width)
-    return _Touch(distance, s, contact, normal, bend, s - held, slope, curvature)
+    return Touch(distance, s, contact, normal, bend, s - held, slope, curvature)
 
 
-def _known(graph: Graph, energy: LearntEnergy, place: Value, touch: _Touch | None, xi: Value) -> _Known:
-    """Return U₀ and its derivatives by the place."""
-    baseline = energy.baseline
-    if isinstance(baseline, ContactBaseline):
-        assert touch is not None
-        return _contact(graph, baseline, touch)
-    if isinstance(baseline, ConstantBaseline):
-        zero = place * 0.0
-        level = place.columns(0, 1) * 0.0 + baseline.level
-        return _Known(level, zero, _outer(zero, zero), level * 0.0, zero)
-    if isinstance(baseline, PadBaseline):
-        return _pad(graph, baseline, place, xi)
+@functools.singledispatch
+def onnx_form(baseline: Any, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
+    """Return U₀ and its derivatives by the place (N, 3), which each kind registers: ``@onnx_form.register``.
+
+    `touch` is the probe at the baseline's surface where there is one, `xi` are the scaled inputs (N, n).
+    """
     raise UsageError(
         f"The baseline {type(baseline).name!r} has no ONNX form.",
         why="Its formula is Python code that is compiled for this machine.",
@@ -154,7 +148,15 @@ def _known(graph: Graph, energy: LearntEnergy, place: Value, touch: _Touch | Non
     )
 
 
-def _contact(graph: Graph, baseline: ContactBaseline, touch: _Touch) -> _Known:
+@onnx_form.register
+def _constant(baseline: ConstantBaseline, graph: Graph, place: Value, touch: Any, xi: Value) -> BaselineForm:
+    zero = place * 0.0
+    level = place.columns(0, 1) * 0.0 + baseline.level
+    return BaselineForm(level, zero, _outer(zero, zero), level * 0.0, zero)
+
+
+@onnx_form.register
+def _contact(baseline: ContactBaseline, graph: Graph, place: Value, touch: Touch, xi: Value) -> BaselineForm:
     """Return the contact law at the depth s; see `palpate.surrogates.contact_law`."""
     twice, factor, length = baseline.law.numbers()
     p, s = 0.5 * twice, graph.where(touch.contact, touch.depth, 1.0)
@@ -169,10 +171,11 @@ def _contact(graph: Graph, baseline: ContactBaseline, touch: _Touch) -> _Known:
     outer = _outer(touch.normal, touch.normal)
     hessian = bend.spread(2) * outer - slope.spread(2) * touch.bend
     gradient, root = -slope * touch.normal, graph.sqrt(2.0 * value)
-    return _Known(value, gradient, hessian, root, gradient / root)
+    return BaselineForm(value, gradient, hessian, root, gradient / root)
 
 
-def _pad(graph: Graph, baseline: PadBaseline, place: Value, xi: Value) -> _Known:
+@onnx_form.register
+def _pad(baseline: PadBaseline, graph: Graph, place: Value, touch: Any, xi: Value) -> BaselineForm:
     """Return ½ ‖S u‖² and its derivatives, with S at the scaled inputs after the felt ones."""
     D = baseline.axes
     k = len(D)
@@ -197,10 +200,10 @@ def _pad(graph: Graph, baseline: PadBaseline, place: Value, xi: Value) -> _Known
     hessian = graph.constant(D.T) @ (S @ S) @ D
     twice = (v * v).sum(1).rows_as(1)
     if k == 1:
-        return _Known(0.5 * twice, gradient, hessian, v.rows_as(1), S.rows_as(1) @ D)
+        return BaselineForm(0.5 * twice, gradient, hessian, v.rows_as(1), S.rows_as(1) @ D)
     root = graph.sqrt(twice)
     by = graph.where(root > 0.0, gradient / graph.where(root > 0.0, root, 1.0), 0.0)
-    return _Known(0.5 * twice, gradient, hessian, root, by)
+    return BaselineForm(0.5 * twice, gradient, hessian, root, by)
 
 
 def _with_polynomial(
@@ -259,11 +262,11 @@ def _to_space(slopes: Slopes, D: np.ndarray) -> Slopes:
     return Slopes(slopes.value, slopes.gradient @ D, graph.constant(D.T) @ slopes.hessian @ D)
 
 
-def _leave(graph: Graph, baseline: Any, touch: _Touch, slopes: Slopes, place: Value) -> Slopes:
+def _leave(graph: Graph, baseline: Any, touch: Touch, slopes: Slopes, place: Value) -> Slopes:
     """Take derivatives by the place c̃ at the saturated depth to those by c; see `contact_baseline`."""
     d, g, H = touch.normal, slopes.gradient, slopes.hessian
     m, rest, curvature = touch.excess, 1.0 - touch.slope, touch.curvature
-    usual = baseline.probe_radius if math.isfinite(baseline.probe_radius) else baseline.touched.reach
+    usual = baseline.radius if math.isfinite(baseline.radius) else baseline.surface.reach
     bend = _bend(graph, touch.distance, place, g, STEP * usual)
     matrix = [value.spread(2) for value in (m, rest, curvature)]
     outer = _outer(d, d)
@@ -295,8 +298,8 @@ def _bend(graph: Graph, distance: Distance, place: Value, g: Value, step: float)
 def _answers(
     graph: Graph,
     energy: LearntEnergy,
-    known: _Known,
-    touch: _Touch | None,
+    known: BaselineForm,
+    touch: Touch | None,
     slopes: Slopes,
     inputs: tuple[Value, Value, Value],
     finite: Value,
@@ -348,7 +351,7 @@ def _inside(graph: Graph, energy: LearntEnergy, X: Value, depth: Value) -> Value
     slack = SLACK * (high - low)
     outside: Value = graph.real((high + slack < X) | (low - slack > X)).sum(1)
     inside: Value = outside < 0.5
-    if math.isfinite(energy.going.deepest) and isinstance(energy.baseline, ContactBaseline):
+    if math.isfinite(energy.going.deepest) and energy.baseline.surface is not None:
         inside = inside & (depth <= energy.going.deepest * (1.0 + SLACK))
     if energy.region is not None:
         scaling = energy.network.scaling

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +84,7 @@ def export_onnx(
 
 def _metadata(thing: Surrogate | Network, block: WeightsBlock) -> dict[str, str]:
     """Return names, units, limits and the hash, as the model's properties."""
-    inputs = [{"name": r.name, "unit": r.unit, "low": r.low, "high": r.high} for r in thing.inputs]
+    inputs = [asdict(r) for r in thing.inputs]
     card = card_of(thing).with_hash(block.label, block.hash)
     plain = {
         "inputs": json.dumps(inputs),
@@ -93,7 +93,7 @@ def _metadata(thing: Surrogate | Network, block: WeightsBlock) -> dict[str, str]
         "card": card.to_json(),
     }
     if isinstance(thing, Network):
-        return plain | {"outputs": json.dumps([{"name": q.name, "unit": q.unit} for q in thing.outputs])}
+        return plain | {"outputs": json.dumps([asdict(q) for q in thing.outputs])}
     units = {
         "energy": "J",
         "force": "N",

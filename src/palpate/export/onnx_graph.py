@@ -6,7 +6,7 @@ being the free number of rows; nothing else of a shape is known here.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,15 @@ def require_onnx() -> Any:
     return onnx
 
 
+def _operator(name: str, *, turned: bool = False) -> Callable[[Value, Any], Value]:
+    """Return the method that adds an operator to the graph; `turned` where the value is the right operand."""
+
+    def apply(self: Value, other: Any) -> Value:
+        return self.graph.op(name, other, self) if turned else self.graph.op(name, self, other)
+
+    return apply
+
+
 class Value:
     """A tensor that a graph computes; arithmetic with it adds operators to its graph."""
 
@@ -40,53 +49,16 @@ class Value:
     def __init__(self, graph: Graph, name: str) -> None:
         self.graph, self.name = graph, name
 
-    def __add__(self, other: Any) -> Value:
-        return self.graph.op("Add", self, other)
-
-    def __radd__(self, other: Any) -> Value:
-        return self.graph.op("Add", other, self)
-
-    def __sub__(self, other: Any) -> Value:
-        return self.graph.op("Sub", self, other)
-
-    def __rsub__(self, other: Any) -> Value:
-        return self.graph.op("Sub", other, self)
-
-    def __mul__(self, other: Any) -> Value:
-        return self.graph.op("Mul", self, other)
-
-    def __rmul__(self, other: Any) -> Value:
-        return self.graph.op("Mul", other, self)
-
-    def __truediv__(self, other: Any) -> Value:
-        return self.graph.op("Div", self, other)
-
-    def __rtruediv__(self, other: Any) -> Value:
-        return self.graph.op("Div", other, self)
+    __add__, __radd__ = _operator("Add"), _operator("Add", turned=True)
+    __sub__, __rsub__ = _operator("Sub"), _operator("Sub", turned=True)
+    __mul__, __rmul__ = _operator("Mul"), _operator("Mul", turned=True)
+    __truediv__, __rtruediv__ = _operator("Div"), _operator("Div", turned=True)
+    __matmul__, __rmatmul__ = _operator("MatMul"), _operator("MatMul", turned=True)
+    __gt__, __lt__, __le__ = _operator("Greater"), _operator("Less"), _operator("LessOrEqual")
+    __and__, __or__ = _operator("And"), _operator("Or")
 
     def __neg__(self) -> Value:
         return self.graph.op("Neg", self)
-
-    def __matmul__(self, other: Any) -> Value:
-        return self.graph.op("MatMul", self, other)
-
-    def __rmatmul__(self, other: Any) -> Value:
-        return self.graph.op("MatMul", other, self)
-
-    def __gt__(self, other: Any) -> Value:
-        return self.graph.op("Greater", self, other)
-
-    def __lt__(self, other: Any) -> Value:
-        return self.graph.op("Less", self, other)
-
-    def __le__(self, other: Any) -> Value:
-        return self.graph.op("LessOrEqual", self, other)
-
-    def __and__(self, other: Value) -> Value:
-        return self.graph.op("And", self, other)
-
-    def __or__(self, other: Value) -> Value:
-        return self.graph.op("Or", self, other)
 
     def __invert__(self) -> Value:
         return self.graph.op("Not", self)

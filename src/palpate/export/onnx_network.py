@@ -14,6 +14,7 @@ import numpy as np
 
 from palpate.export.onnx_graph import Graph, Value
 from palpate.network import Network
+from palpate.network.radial import radial
 
 __all__ = ["Slopes", "add_network", "network_slopes", "regressors"]
 
@@ -50,21 +51,7 @@ def _units(graph: Graph, network: Network, xi: Value, felt: int) -> _Units:
         for r, row in enumerate(rows[1:], 1):
             u = u + row * A[:, r, i]
         pulled.append(u)
-    return _Units(*_radial(graph, network.radial, q), pulled)
-
-
-def _radial(graph: Graph, name: str, q: Value) -> tuple[Value, Value, Value]:
-    """Return g, g' and g'' of a radial function at squared distances."""
-    if name == "gaussian":
-        g = graph.exp(-q)
-        return g, -g, g
-    if name == "inverse-multiquadric":
-        u = 1.0 / (1.0 + q)
-        g = graph.sqrt(u)
-        return g, -0.5 * g * u, 0.75 * g * u * u
-    s = graph.sqrt(5.0 * q)
-    e = graph.exp(-s)
-    return (1.0 + s + s * s / 3.0) * e, (-5.0 / 6.0) * (1.0 + s) * e, (25.0 / 12.0) * e
+    return _Units(*radial(network.radial, q, graph.exp, graph.sqrt), pulled)
 
 
 def _rows(network: Network) -> np.ndarray:

@@ -7,7 +7,7 @@ vanishes, and a few hundred others evenly between.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -137,7 +137,7 @@ class GrowthRecorder:
         one = len(self.inputs) == 1
         output = self.outputs[self.drawn]
         return {
-            "inputs": [{"name": r.name, "unit": r.unit, "low": r.low, "high": r.high} for r in self.inputs],
+            "inputs": [asdict(r) for r in self.inputs],
             "output": {"name": output.name, "unit": output.unit},
             "samples": _digits(X[rows]),
             "values": _digits(Y[rows, self.drawn]),

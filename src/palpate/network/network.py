@@ -14,6 +14,7 @@ from numba.core.errors import TypingError
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
+from palpate.kernels import for_rows
 from palpate.network.network_kernels import (
     Precision,
     hessian_into,
@@ -318,7 +319,7 @@ class Network:
             )
         compiled = self.compiled(precision)
         Y = np.empty((X.shape[0], len(self.outputs)), compiled[0].dtype)
-        values_into(X, Y, *compiled)
+        for_rows(values_into, len(X))(X, Y, *compiled)
         return Y
 
     def precision_error(self, X: np.ndarray) -> np.ndarray:
@@ -341,7 +342,7 @@ class Network:
             If x has another shape.
         """
         J = np.empty((len(self.inputs), len(self.outputs)))
-        jacobian_into(self._point(x), J, *self.compiled())
+        for_rows(jacobian_into, 1)(self._point(x), J, *self.compiled())
         return np.ascontiguousarray(J.T)
 
     def hessian(self, x: np.ndarray) -> np.ndarray:
@@ -359,7 +360,7 @@ class Network:
             )
         n = len(self.inputs)
         H = np.empty((n, n))
-        hessian_into(self._point(x), H, np.empty((n, n)), np.empty(n), *self.compiled())
+        for_rows(hessian_into, 1)(self._point(x), H, np.empty((n, n)), np.empty(n), *self.compiled())
         return H
 
     def _point(self, x: np.ndarray) -> np.ndarray:

@@ -30,9 +30,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
-from numba import njit
 
 from palpate.errors import UsageError
+from palpate.kernels import kernel, part
 from palpate.network.radial import D1, D2, HEAD, RADIAL_FUNCTIONS, P, Q, T, constants, radial_into
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ __all__ = [
     "jacobian_into",
     "packed",
     "pattern",
+    "point_into",
     "regressor_rows_into",
     "regressors_into",
     "second_order_into",
@@ -107,11 +108,10 @@ def workspace(parts: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:
     return work, work.view(_TYPES["double" if units.dtype == np.float64 else "single"][1])
 
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 _SMALL = 8  # number of outputs: fewer are summed in registers, more along the rows
 
 
-@_jit
+@part
 def combine(z, rows, y) -> None:
     """y (m,) = Σ_k z[k] rows[k], rows (K, m), with z at least K long: term after term for each output.
 
@@ -123,14 +123,14 @@ def combine(z, rows, y) -> None:
         _many(z, rows, y)
 
 
-@_jit
+@part
 def combine_lines(Z, rows, Y) -> None:
     """`combine` for each line of Z (n, ≥ K) into Y (n, m)."""
     for i in range(Z.shape[0]):
         combine(Z[i], rows, Y[i])
 
 
-@_jit
+@part
 def _few(z, rows, y) -> None:
     """Up to four running sums at a time, in registers."""
     count, m = rows.shape
@@ -151,7 +151,7 @@ def _few(z, rows, y) -> None:
         j += 1
 
 
-@_jit
+@part
 def _many(z, rows, y) -> None:
     """Eight rows pass at a time, so that y is loaded and stored less often."""
     count, m = rows.shape
@@ -181,7 +181,7 @@ def _many(z, rows, y) -> None:
 # fastmath stays off: the runtime must agree with Network.predict to the last bits on every machine
 
 
-@_jit
+@part
 def _regress(x, line, work, steps, layout, scales, units, constants, order) -> None:
     """Fill a line of work with [1, ξ, φ]; A ξ − b and the radial function's derivatives stay in work."""
     n, h, count = x.size, units.shape[1], layout.shape[0] - 1
@@ -205,7 +205,7 @@ def _regress(x, line, work, steps, layout, scales, units, constants, order) -> N
     radial_into(layout[0, 0], work, steps, work[line, 1 + n : 1 + n + h], constants, order)
 
 
-@_jit
+@part
 def _slopes(line, work, layout, scales, units) -> None:
     """Fill the n lines after `line` with the derivatives of [1, ξ, φ] by x; needs `_regress` with order 1."""
     n, h = scales.shape[1], units.shape[1]
@@ -225,7 +225,7 @@ def _slopes(line, work, layout, scales, units) -> None:
             work[target, 1 + n + k] *= turn * work[D1, k]
 
 
-@_jit
+@part
 def _output(y, line, latent, first, work, rows, modes) -> None:
     """Outputs (first = 1) or one derivative of them (first = 0) from one line."""
     if modes.shape[0] == 0:
@@ -236,7 +236,7 @@ def _output(y, line, latent, first, work, rows, modes) -> None:
     combine(work[latent], modes, y)
 
 
-@_jit
+@part
 def _gradients(J, line, latent, work, rows, modes) -> None:
     """All n derivatives J (n, m) from the lines after `line`."""
     n = J.shape[0]
@@ -247,16 +247,16 @@ def _gradients(J, line, latent, work, rows, modes) -> None:
         _output(J[i], line + 1 + i, latent + 1 + i, 0, work, rows, modes)
 
 
-@_jit
+@part
 def _places(work, layout, scales, units) -> tuple[int, int]:
     """Rows of work at which the lines and the latent outputs begin."""
     line = HEAD + units.shape[0] - (layout.shape[0] - 1)
     return line, line + 1 + scales.shape[1]
 
 
-@_jit
-def value_into(x, y, work, steps, layout, scales, units, rows, modes, constants) -> bool:
-    """Evaluate one point x (n,) into y (m,); False, and nothing done, where x has another size than n."""
+@part
+def point_into(x, y, work, steps, layout, scales, units, rows, modes, constants) -> bool:
+    """Do what `value_into` does, inside of another kernel."""
     if x.size != scales.shape[1]:
         return False
     line, latent = _places(work, layout, scales, units)
@@ -265,16 +265,22 @@ def value_into(x, y, work, steps, layout, scales, units, rows, modes, constants)
     return True
 
 
-@_jit
+@kernel
+def value_into(x, y, work, steps, layout, scales, units, rows, modes, constants) -> bool:
+    """Evaluate one point x (n,) into y (m,); False, and nothing done, where x has another size than n."""
+    return point_into(x, y, work, steps, layout, scales, units, rows, modes, constants)
+
+
+@kernel
 def values_into(X, Y, work, steps, layout, scales, units, rows, modes, constants) -> bool:
     """Evaluate N points X (N, n) into Y (N, m), each exactly as `value_into` does."""
     for i in range(X.shape[0]):
-        if not value_into(X[i], Y[i], work, steps, layout, scales, units, rows, modes, constants):
+        if not point_into(X[i], Y[i], work, steps, layout, scales, units, rows, modes, constants):
             return False
     return True
 
 
-@_jit
+@kernel
 def jacobian_into(x, J, work, steps, layout, scales, units, rows, modes, constants) -> bool:
     """∂f/∂x at x (n,) into J (n, m): one row for each input."""
     if x.size != scales.shape[1]:
@@ -286,7 +292,7 @@ def jacobian_into(x, J, work, steps, layout, scales, units, rows, modes, constan
     return True
 
 
-@_jit
+@kernel
 def value_and_jacobian_into(x, y, J, work, steps, layout, scales, units, rows, modes, constants) -> bool:
     """f into y (m,) and ∂f/∂x into J (n, m) at x (n,); the same bits as from `value_into` and `jacobian_into`."""
     if x.size != scales.shape[1]:
@@ -299,7 +305,7 @@ def value_and_jacobian_into(x, y, J, work, steps, layout, scales, units, rows, m
     return True
 
 
-@_jit
+@part
 def _curvature(k, slopes, H, work, layout, units) -> None:
     """Second derivatives of φ_k by ξ, times 1, added to H: 4 g'' (Aᵀv)(Aᵀv)ᵀ + 2 g' AᵀA with v = A ξ − b."""
     n, count = slopes.size, layout.shape[0] - 1
@@ -315,7 +321,7 @@ def _curvature(k, slopes, H, work, layout, units) -> None:
                 H[layout[1 + e, 1], layout[1 + f, 1]] += 2.0 * work[D1, k] * units[e, k] * units[f, k]
 
 
-@_jit
+@kernel
 def hessian_into(x, H, one, slopes, work, steps, layout, scales, units, rows, modes, constants) -> bool:
     """∂²f/∂x² of the only output into H (n, n); one (n, n) and slopes (n,) are scratch."""
     if x.size != scales.shape[1]:
@@ -357,7 +363,7 @@ def gram(network: Network, q: int) -> np.ndarray:
     return np.ascontiguousarray(np.einsum("kri,krj->kij", A, A)[:, i, j].T)
 
 
-@_jit
+@part
 def _pulled(line, q, work, layout, scales, units) -> None:
     """u = Aᵀ(A ξ − b) of all units, one line after `line` for each of the first q inputs."""
     first, h = 1 + scales.shape[1], units.shape[1]
@@ -372,7 +378,7 @@ def _pulled(line, q, work, layout, scales, units) -> None:
                 work[target, first + k] += units[e, k] * work[row, k]
 
 
-@_jit
+@part
 def second_order_into(x, g, H, grams, work, steps, layout, scales, units, rows, modes, constants) -> float:
     """f at x (n,); ∂f/∂x into g (q,) and ∂²f/∂x² into H (q, q), by the first q inputs."""
     q, n, h = g.size, x.size, units.shape[1]
@@ -402,7 +408,7 @@ def second_order_into(x, g, H, grams, work, steps, layout, scales, units, rows, 
     return float(value)
 
 
-@_jit
+@kernel
 def regressor_rows_into(X, F, work, steps, layout, scales, units, constants) -> None:
     """[1, ξ, φ] at N points X (N, n) into F (N, 1 + n + h), each as `value_into` has them."""
     line, _ = _places(work, layout, scales, units)
@@ -412,7 +418,7 @@ def regressor_rows_into(X, F, work, steps, layout, scales, units, constants) -> 
             F[i, k] = work[line, k]
 
 
-@_jit
+@part
 def regressors_into(x, work, steps, layout, scales, units, rows, modes, constants) -> int:
     """[1, ξ, φ] at x (n,) into one line of work, its n derivatives by x into the next; the line's number."""
     line, _ = _places(work, layout, scales, units)

@@ -21,10 +21,11 @@ Rows of `work`, of which the first h columns are used, with `steps` the same mem
 from __future__ import annotations
 
 import math
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
-from numba import njit
+
+from palpate.kernels import part
 
 __all__ = [
     "D1",
@@ -43,17 +44,20 @@ RadialFunction = Literal["gaussian", "inverse-multiquadric", "matern-5/2"]
 RADIAL_FUNCTIONS: tuple[RadialFunction, ...] = get_args(RadialFunction)
 
 
-def radial(name: RadialFunction, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """g, dg/dq and d²g/dq² at squared distances q ≥ 0 of any shape; all finite at q = 0."""
+def radial(name: RadialFunction, q: Any, exp: Any = np.exp, sqrt: Any = np.sqrt) -> tuple[Any, Any, Any]:
+    """g, dg/dq and d²g/dq² at squared distances q ≥ 0 of any shape; all finite at q = 0.
+
+    Arrays, or values of a graph with its own `exp` and `sqrt`.
+    """
     if name == "gaussian":
-        g = np.exp(-q)
+        g = exp(-q)
         return g, -g, g
     if name == "inverse-multiquadric":
         u = 1.0 / (1.0 + q)
-        g = np.sqrt(u)
+        g = sqrt(u)
         return g, -0.5 * g * u, 0.75 * g * u * u
-    s = np.sqrt(5.0 * q)
-    e = np.exp(-s)
+    s = sqrt(5.0 * q)
+    e = exp(-s)
     return (1.0 + s + s * s / 3.0) * e, (-5.0 / 6.0) * (1.0 + s) * e, (25.0 / 12.0) * e
 
 
@@ -77,8 +81,6 @@ Q, T, P, D1, D2, HEAD = 0, 1, 2, 3, 4, 5
 DEGREE = 13  # degree of the Taylor polynomial of the exponential
 _GAUSSIAN, _MULTIQUADRIC = 0, 1  # places in RADIAL_FUNCTIONS
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
-
 
 def constants(dtype: type[np.floating]) -> np.ndarray:
     """Numbers that the kernels need in their own precision, so that nothing is promoted to another.
@@ -99,7 +101,7 @@ def constants(dtype: type[np.floating]) -> np.ndarray:
 _LN2_TAIL = 2.3190468138462996e-17  # ln 2 minus its nearest double
 
 
-@_jit
+@part
 def _exponential(h, work, steps, c) -> None:
     """work[P] = exp(−work[T]) for work[T] ≥ 0; T is lost."""
     c2, c3, c4, c5, c6, c7, c8, c9 = c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9]
@@ -131,7 +133,7 @@ def _exponential(h, work, steps, c) -> None:
         steps[P, k] += steps[T, k] << shift
 
 
-@_jit
+@part
 def _gaussian(h, work, steps, phi, c, order) -> None:
     for k in range(h):
         work[T, k] = work[Q, k]
@@ -144,7 +146,7 @@ def _gaussian(h, work, steps, phi, c, order) -> None:
             work[D2, k] = work[P, k]
 
 
-@_jit
+@part
 def _multiquadric(h, work, phi, c, order) -> None:
     one, first, second = c[0], c[23], c[24]
     for k in range(h):
@@ -157,7 +159,7 @@ def _multiquadric(h, work, phi, c, order) -> None:
             work[D2, k] = second * phi[k] * work[T, k] * work[T, k]
 
 
-@_jit
+@part
 def _matern(h, work, steps, phi, c, order) -> None:
     one, limit, five, third, first, second = c[0], c[18], c[19], c[20], c[21], c[22]
     for k in range(h):
@@ -175,7 +177,7 @@ def _matern(h, work, steps, phi, c, order) -> None:
             work[D2, k] = second * work[P, k]
 
 
-@_jit
+@part
 def radial_into(code, work, steps, phi, c, order) -> None:
     """phi (h,) = g(work[Q]); its derivatives into work[D1] and work[D2] if order > 0; work[Q] is lost."""
     if code == _GAUSSIAN:

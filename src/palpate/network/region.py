@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
+from palpate.kernels import for_rows, kernel
 
 __all__ = ["TrainedRegion"]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 _DOUBLE = np.dtype(np.float64)
 _MOST = 512  # points kept, at most: a query takes a few microseconds
@@ -120,7 +119,7 @@ class TrainedRegion:
         X = np.ascontiguousarray(X, dtype=np.float64)
         if X.ndim != 2 or X.shape[1] != self.points.shape[1]:
             raise self._refused(X, "(N, {n})")
-        return np.asarray(_distances(X, self.points))
+        return np.asarray(for_rows(_distances, len(X))(X, self.points))
 
     def inside(self, x: np.ndarray) -> bool:
         """True where a scaled input x (n,) is within the radius of a training input.
@@ -149,7 +148,7 @@ class TrainedRegion:
         )
 
 
-@_jit
+@kernel(allocates=True)
 def _distance(x: np.ndarray, points: np.ndarray) -> float:
     S, n = points.shape
     best = np.inf
@@ -162,7 +161,7 @@ def _distance(x: np.ndarray, points: np.ndarray) -> float:
     return float(np.sqrt(best))
 
 
-@_jit
+@kernel(allocates=True)
 def _distances(X: np.ndarray, points: np.ndarray) -> np.ndarray:
     out = np.empty(len(X))
     for i in range(len(X)):
@@ -170,7 +169,7 @@ def _distances(X: np.ndarray, points: np.ndarray) -> np.ndarray:
     return out
 
 
-@_jit
+@kernel(allocates=True)
 def _farthest(X: np.ndarray, count: int) -> tuple[np.ndarray, float]:
     """Indices of points far from each other, the first near the middle, and the largest squared gap left."""
     N, n = X.shape
@@ -202,7 +201,7 @@ def _farthest(X: np.ndarray, count: int) -> tuple[np.ndarray, float]:
     return chosen, widest
 
 
-@_jit
+@kernel(allocates=True)
 def _gaps(X: np.ndarray, own: np.ndarray, points: np.ndarray, groups: np.ndarray) -> np.ndarray:
     """Distance (N,) of each row of X, of its own group (N,), to the nearest kept point of another group."""
     out = np.empty(len(X))

@@ -20,7 +20,17 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["Block", "attach", "create", "folder", "remove"]
+from palpate.errors import DeviceError
+
+__all__ = [
+    "Block",
+    "attach",
+    "attach_to",
+    "create",
+    "create_for",
+    "folder",
+    "remove",
+]
 
 _RAM = Path("/dev/shm")
 
@@ -57,6 +67,28 @@ def attach(name: str, head: bytes, size: int = 0) -> mmap.mmap:
         memory.close()
         raise ValueError("Another program or another version of palpate made it.")
     return memory
+
+
+def create_for(what: str, head: bytes, size: int) -> str:
+    """Make a file as `create` does; a system that gives no room is a DeviceError that says for what."""
+    try:
+        return create(head, size)
+    except OSError as error:
+        raise DeviceError(
+            f"No shared memory for {what}.", why=str(error), fix=f"Free some space in {folder()}."
+        ) from error
+
+
+def attach_to(what: str, name: str, head: bytes, size: int = 0) -> mmap.mmap:
+    """Map a file as `attach` does; one that isn't there, or is something else, is a DeviceError that says what."""
+    try:
+        return attach(name, head, size)
+    except (OSError, ValueError) as error:
+        raise DeviceError(
+            f"There is no {what} named {name!r}.",
+            why=str(error),
+            fix="Its owner has ended, or is of another installation; start again.",
+        ) from error
 
 
 def remove(name: str) -> None:

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from palpate.errors import UsageError
 from palpate.files import writing
+from palpate.kernels import kernel
 from palpate.output_files import picture_metadata
 from palpate.physics import deformed
 from palpate.physics.deformed import Ball, NodalField
@@ -202,7 +202,7 @@ class Camera:
         return np.stack([width / 2 + self.scale * right, height / 2 - self.scale * up, depth], axis=-1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def draw_triangles(screen: np.ndarray, attributes: np.ndarray, depth: np.ndarray, image: np.ndarray) -> None:
     """Draw triangles: each pixel keeps the attributes of the nearest one, interpolated linearly.
 

@@ -7,15 +7,14 @@ Of derivatives f[c, N, a, …] at the image c of sample N those at the sample ar
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from palpate.kernels import kernel
 
 __all__ = ["curvatures_by_factors", "slopes_by_factors"]
 
 Derivatives = tuple[np.ndarray, np.ndarray, np.ndarray]
 Pattern = tuple[np.ndarray, np.ndarray]
 _NO_PATTERN = (np.zeros(0, np.int64), np.zeros(0, np.int64))
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 def slopes_by_factors(
@@ -63,7 +62,7 @@ def _blank(v: np.ndarray, count: int, pattern: Pattern | None) -> Derivatives:
     return first, second, third
 
 
-@_jit
+@kernel(allocates=True)
 def _slopes_into(points, turns, v, g, A, pattern, found) -> None:
     (g1, g2), (rows, columns), (slopes, by_entry, by_shift) = g, pattern, found
     c, N, n = points.shape
@@ -93,7 +92,7 @@ def _slopes_into(points, turns, v, g, A, pattern, found) -> None:
                             by_entry[s, i, k, e] += t * one
 
 
-@_jit
+@kernel(allocates=True)
 def _curvatures_into(points, turns, v, g, A, pattern, pairs, found) -> None:  # noqa: PLR0912
     (g1, g2, g3), (rows, columns), (first, second) = g, pattern, pairs
     bends, by_entry, by_shift = found

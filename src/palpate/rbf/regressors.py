@@ -22,9 +22,9 @@ from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
-from numba import njit
 
 from palpate.errors import UsageError
+from palpate.kernels import kernel
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction, radial, third
 from palpate.rbf.derivative_kernels import Derivatives, Pattern, curvatures_by_factors, slopes_by_factors
 from palpate.rbf.forms import Form, chain_of
@@ -161,7 +161,7 @@ class Regressors:
         return np.asarray((X @ A.reshape(h * r, n).T).reshape(len(X), h, r) - b)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _chain_into(
     X: np.ndarray,
     v: np.ndarray,

@@ -16,13 +16,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from palpate.kernels import kernel
 from palpate.runtime.hand_evaluator import HandEvaluator, stiffness_along
 
 __all__ = ["Blend", "compile_blend"]
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 class Blend:
@@ -108,7 +106,7 @@ def compile_blend() -> None:
     _mix(0.0, np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3)))
 
 
-@_jit
+@kernel
 def _mix(share, old, new, old_tangent, new_tangent, force, tangent) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill the mean of two forces (3,) and two tangents (3, 3), the second with a share of 0 to 1."""
     for i in range(3):

@@ -31,17 +31,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from palpate.errors import UsageError
+from palpate.kernels import kernel
 
 __all__ = ["Coupling", "coupling_stiffness"]
 
 STEPS = 3  # Newton steps a tick on a body without memory
 # what may be left of the balance, as a share of the force, and in N: no hand feels less
 _BALANCED, _UNFELT = 1e-3, 1e-3
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 def coupling_stiffness(stiffness: float, bound: float) -> float:
@@ -128,13 +126,13 @@ class Coupling:
         return self.force
 
 
-@_jit
+@kernel
 def _pull(proxy, hand, stiffness, force):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     for i in range(3):
         force[i] = -stiffness * (hand[i] - proxy[i])
 
 
-@_jit
+@kernel
 def _balanced(proxy, hand, force, stiffness):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     rest, size = 0.0, 0.0
     for i in range(3):
@@ -144,7 +142,7 @@ def _balanced(proxy, hand, force, stiffness):  # type: ignore[no-untyped-def]  #
     return rest <= _BALANCED**2 * size + _UNFELT**2
 
 
-@_jit
+@kernel
 def _follow(proxy, hand, force, tangent, spring, hardest):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Solve (k I + H) Δp = k (x − p) + F by Cholesky, H = −∂F/∂p; without a positive H by the largest stiffness."""
     a, b, c = spring - tangent[0, 0], -tangent[1, 0], spring - tangent[1, 1]

@@ -22,8 +22,8 @@ import math
 from typing import Any, Protocol
 
 import numpy as np
-from numba import njit
 
+from palpate.kernels import for_rows, kernel
 from palpate.surrogates.memories import Carry
 from palpate.surrogates.moving_rest import MovingRest
 from palpate.units import Range
@@ -32,8 +32,6 @@ __all__ = ["Elastic", "HandEvaluator", "Model", "stiffness_along"]
 
 # slope of d: 1 for a distance, measured 1.0004 at most where five bodies are pressed; behind flat ones it is 6 at s = 0
 _STEEP = 1.2
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 class Elastic(Protocol):
@@ -87,7 +85,7 @@ class HandEvaluator:
     unit vectors, x, y and z unless given; `normal` (3,) is the outer normal of the surface where a probe usually
     touches; `inner` is how far inside it the probe's centre may go, m, infinite for a body that never lets go; `radius`
     is the probe's, m, unless it is the further input of number `radius_input`; `places` are those further inputs that a
-    hand which holds can't change: they say where it has taken hold.
+    hand which holds can't change: they say where it has taken hold. One for a `few` places interprets kernels.
 
     Its answer: `force` (3,), N, on the hand; `contact` (3,), m, the probe's centre or the offset of the held place from
     its rest; `loads` (n,), the inputs of the field at its nodes there, such as loads, N; `inside` the trained region or
@@ -116,6 +114,7 @@ class HandEvaluator:
         radius_input: int | None = None,
         node: Any = None,
         places: tuple[int, ...] = (),
+        few: bool = False,
     ) -> None:
         self._elastic, self._memory, self._holds = elastic, memory, holds
         self.away = np.zeros(3) if away is None else away
@@ -138,9 +137,13 @@ class HandEvaluator:
         self.inside, self.let_go = True, False
         self.waiting, self.rest_zone = False, 0.0
         self.depth, self.stiffness, self.elapsed = -math.inf, 0.0, 0.0
-        stiffness_along(elastic.force, elastic.stiffness)  # compile now, not in the loop
-        _behind(self._normal, self._normal)
-        _project(self._place, self._onto, self._place.copy())
+        kernels = (stiffness_along, _behind, _project)
+        self._stiffness_along, self._behind, self._project = (
+            for_rows(own, 1) if few else own for own in kernels
+        )
+        self._stiffness_along(elastic.force, elastic.stiffness)  # compile now, not in the loop
+        self._behind(self._normal, self._normal)
+        self._project(self._place, self._onto, self._place.copy())
 
     def place(self, position: np.ndarray, *, holding: bool, believed: bool) -> None:
         """Turn the hand's place (3,), m, in place into that of the probe or of what it holds.
@@ -228,7 +231,7 @@ class HandEvaluator:
                 elastic.force *= 0.0
             good = memory is None or memory.step(position, amplitude, elastic.slope, self.elapsed)
         stays = self._stays
-        _project(position if stays is None or self._held else stays.lies, self._onto, self._place)
+        self._project(position if stays is None or self._held else stays.lies, self._onto, self._place)
         if stays is not None:
             stays.lies[:] = self._place
         if self._node is not None:
@@ -236,7 +239,7 @@ class HandEvaluator:
         self.inside = elastic.inside and not self.let_go
         untouched = self.let_go or (self.waiting and not self._holds)
         self.depth = 0.0 if untouched else elastic.depth
-        self.stiffness = stiffness_along(elastic.force, elastic.stiffness)
+        self.stiffness = self._stiffness_along(elastic.force, elastic.stiffness)
         if not good:
             self.force[:] = math.nan  # the loop makes a fault of it
 
@@ -265,18 +268,18 @@ class HandEvaluator:
         radius = self._radius if own is None else parameters[own]
         if depth <= 0.0:
             self.let_go = False
-        elif depth > self._inner + radius or _behind(self._elastic.outward, self._normal):
+        elif depth > self._inner + radius or self._behind(self._elastic.outward, self._normal):
             self.let_go = True
 
 
-@_jit
+@kernel
 def _project(position, onto, place) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill the part of a position along the felt directions into `place`."""
     for i in range(3):
         place[i] = onto[i, 0] * position[0] + onto[i, 1] * position[1] + onto[i, 2] * position[2]
 
 
-@_jit
+@kernel
 def stiffness_along(force, stiffness) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """−F·(∂F/∂x)F/‖F‖², N/m, of a force (3,), N, and ∂F/∂x (3, 3), N/m; 0 without a force."""
     size, total = 0.0, 0.0
@@ -287,7 +290,7 @@ def stiffness_along(force, stiffness) -> float:  # type: ignore[no-untyped-def] 
     return total / size if size > 0.0 else 0.0
 
 
-@_jit
+@kernel
 def _behind(slope, normal) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Return whether d climbs towards the back, and faster than a distance does."""
     square, out = 0.0, 0.0

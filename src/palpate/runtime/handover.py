@@ -16,7 +16,6 @@ import struct
 import time
 from dataclasses import replace
 
-from palpate.errors import DeviceError
 from palpate.network import shared_memory
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import NodeField
@@ -49,15 +48,8 @@ def hand_over(body: Touchable) -> str:
     for part in parts:
         places.append(place)
         place = _aligned(place + len(part))
-    try:
-        name = shared_memory.create(_MAGIC, place)
-        memory = shared_memory.attach(name, _MAGIC)
-    except OSError as error:
-        raise DeviceError(
-            "No shared memory for another surrogate.",
-            why=str(error),
-            fix=f"Free some space in {shared_memory.folder()}.",
-        ) from error
+    name = shared_memory.create_for("another surrogate", _MAGIC, place)
+    memory = shared_memory.attach(name, _MAGIC)
     memory[_HEAD : _HEAD + _SIZE.size * len(sizes)] = b"".join(sizes)
     for start, part in zip(places, parts, strict=True):
         memory[start : start + len(part)] = part.tobytes()
@@ -67,12 +59,7 @@ def hand_over(body: Touchable) -> str:
 
 def take(name: str) -> Touchable:
     """Return the body that another process has left, its arrays where they lie, and remove the name."""
-    try:
-        memory = shared_memory.attach(name, _MAGIC)
-    except (OSError, ValueError) as error:
-        raise DeviceError(
-            f"There is no body named {name!r}.", why=str(error), fix="Ask for the swap again."
-        ) from error
+    memory = shared_memory.attach_to("body", name, _MAGIC)
     shared_memory.remove(name)
     view = memoryview(memory)
     _touch(view)

@@ -25,6 +25,9 @@ BINS = 64
 _LOW, _DECADES = 1e-6, 6.0  # s where the bins begin, 1 µs, and decades from there to 1 s
 _PER_DECADE = (BINS - 2) / _DECADES
 
+_AS_PUBLISHED = ("rate", "lateness_p50", "lateness_p99", "lateness_p999", "lateness_max", "work_p50", "work_p99",
+                 "energy_lowest", "damping_energy", "sensor_noise")  # fmt: skip
+
 EDGES = _LOW * 10.0 ** (np.arange(BINS - 1) / _PER_DECADE)  # (63,) s: bin k holds EDGES[k-1] ≤ t < EDGES[k]
 
 
@@ -156,24 +159,15 @@ class LoopReport:
         bounds = state.felt_stiffness
         return cls(
             ticks=state.tick,
-            rate=state.rate,
-            lateness_p50=state.lateness_p50,
-            lateness_p99=state.lateness_p99,
-            lateness_p999=state.lateness_p999,
-            lateness_max=state.lateness_max,
-            work_p50=state.work_p50,
-            work_p99=state.work_p99,
+            **{name: getattr(state, name) for name in _AS_PUBLISHED},
             clamped=state.clamped_ticks / max(1, state.tick),
             faults={f.name.lower(): int(state.fault_counts[f]) for f in Fault if state.fault_counts[f]},
             obtained=dict(obtained or {}),
             foreign=foreign,
             device_error=device_error,
             device_note=device_note,
-            energy_lowest=state.energy_lowest,
             leak_bound=bounds.felt * state.leak,
-            damping_energy=state.damping_energy,
             delay=bounds.delay,
-            sensor_noise=state.sensor_noise,
             body_stiffness=bounds.body,
             felt_stiffness=bounds.felt,
             stiffness="" if bounds.damping is None else str(bounds),

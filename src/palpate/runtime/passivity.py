@@ -63,10 +63,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from palpate.devices.tick_record import LEDGER
 from palpate.errors import UsageError
+from palpate.kernels import kernel, part
 from palpate.runtime.sensor_noise import NOISE_STATE, forget_motion, measure_noise
 
 __all__ = ["LONGEST_DELAY", "PassivityController", "largest_damping"]
@@ -90,8 +90,6 @@ _SEEN, _HEAD, _BALANCE, _STORED, _TICKS, _ALPHA = range(LEDGER, 12)
 # of three numbers each: filtered place, its way in the last tick, booked place, filtered force and its sum since
 _PLACE, _WAY, _BOOKED, _FORCE, _SUM = range(12, 27, 3)
 _SIZE = 27
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 def largest_damping(mass: float, rate: float, *, delay: float = 0.0) -> float:
@@ -225,13 +223,13 @@ class PassivityController:
             self.sent[int(self.state[_HEAD]), :3] = force
 
 
-@_jit
+@kernel
 def _stable_damping(mass, period, delay):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """½ m/(T + d), N·s/m."""
     return _SHARE * mass / (period + delay)
 
 
-@_jit
+@part
 def _filter_time(noise, period, delay, max_force, mass, stiffness):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """The time constant τ, s, at which the bounds of the damping leave most of it."""
     if noise <= 0.0:
@@ -245,7 +243,7 @@ def _filter_time(noise, period, delay, max_force, mass, stiffness):  # type: ign
     return min(max(time, 0.0), _LONGEST_FILTER)
 
 
-@_jit
+@part
 def _damping_bound(noise, time, period, delay, max_force, mass, stiffness):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """The largest α, N·s/m, on this mass and with this noise."""
     bound = _stable_damping(mass, period, delay + time)
@@ -257,7 +255,7 @@ def _damping_bound(noise, time, period, delay, max_force, mass, stiffness):  # t
     return bound
 
 
-@_jit
+@part
 def _observe(state, sent, position, stored, clamped, free, share, ball, elapsed, late):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Book the work of the interval that has just ended; return the square of the filtered way, m², and the balance."""
     head = int(state[_HEAD])
@@ -301,7 +299,7 @@ def _observe(state, sent, position, stored, clamped, free, share, ball, elapsed,
     return square, balance - work
 
 
-@_jit
+@part
 def _begin(state, position, stored):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Start the filters at a place whose way nobody saw."""
     state[_STORED], state[_TICKS] = stored, 0.0
@@ -310,7 +308,7 @@ def _begin(state, position, stored):  # type: ignore[no-untyped-def]  # noqa: AN
         state[_WAY + i] = state[_FORCE + i] = state[_SUM + i] = 0.0
 
 
-@_jit
+@part
 def _damp(state, force, debt, square, bound, payback, max_force, elapsed):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Add what pays a debt, J, to a force (3,), N; return the energy that it will take in a tick, J."""
     wanted = 0.0
@@ -334,7 +332,7 @@ def _damp(state, force, debt, square, bound, payback, max_force, elapsed):  # ty
     return taken
 
 
-@_jit
+@kernel
 def _step(state, sent, places, position, force, elapsed, late, device, stored, clamped, free):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     period, max_force, mass, stated, stiffness = device
     late = min(max(late, 0.0), float(LONGEST_DELAY))

@@ -9,7 +9,7 @@ from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.loop_report import Histogram
 from palpate.runtime.passivity import PassivityController
 from palpate.runtime.safety import Fault, Limits
-from palpate.runtime.shared_state import ONSETS, Shared, size_of
+from palpate.runtime.shared_state import ONSETS, STATE, Shared, size_of
 from palpate.runtime.stability import FeltStiffness
 from palpate.runtime.workspace import Workspace
 
@@ -31,17 +31,10 @@ class Publisher:
         self._indentation, self._amplitude = shared.indentation, shared.indentation.record["amplitude"]
         self.record = record
         self.hand, self.position, self.force = record["hand"], record["position"], record["force"]
-        self._contact, self._loads = record["contact"], record["loads"][:inputs]
-        self._depth, self._stiffness = record["depth"], record["stiffness"]
-        self._let_go, self._ledger = record["let_go"], record["ledger"]
-        self._tick, self._time = record["tick"], record["time"]
-        self._inside = record["inside"]
-        self._grabbed, self._stalled, self._clamped = record["grabbed"], record["stalled"], record["clamped"]
-        self._withheld, self._waiting, self._idle = record["withheld"], record["waiting"], record["idle"]
-        self._stopped, self._released = record["stopped"], record["released"]
-        self._fault, self._lateness, self._work = record["fault"], record["lateness"], record["work"]
+        self._loads = record["loads"][:inputs]
+        # views are written to in a tenth of the time that the record takes
+        self._views = {name: record[name] for name in STATE.names or ()}
         self._late, self._worked = Histogram(record["histogram"]), Histogram(record["work_histogram"])
-        self._worst = record["lateness_max"]
         self._count, self._before = 0, Fault.NONE
         self._counted, self._since = 1, math.inf  # when the rate was last taken
 
@@ -50,7 +43,7 @@ class Publisher:
         self.record["scale"], self.record["radius"] = workspace.scale, workspace.radius
         self.record["max_force"] = limits.max_force
         self.record["coupling"] = math.inf
-        self._inside[()] = True
+        self._views["inside"][()] = True
         self.record["device_stiffness"] = math.inf
 
     def device(self, name: str) -> None:
@@ -63,19 +56,22 @@ class Publisher:
 
     def hold_back(self, withheld: Fault, *, waiting: bool, stopped: bool, released: bool) -> None:
         """Take over why there is no force, besides a fault: see `STATE`."""
-        self._withheld[()], self._waiting[()] = withheld, waiting
-        self._stopped[()], self._released[()] = stopped, released
+        self._views["withheld"][()], self._views["waiting"][()] = withheld, waiting
+        self._views["stopped"][()], self._views["released"][()] = stopped, released
 
     def input(self, *, holding: bool, late: bool) -> None:
         """Take over whether a hand holds the body, and whether its input is too old."""
-        self._grabbed[()], self._stalled[()] = holding, late
+        self._views["grabbed"][()], self._views["stalled"][()] = holding, late
 
     def answer(self, answer: HandEvaluator | Blend) -> None:
         """Take over the learnt body's answer, and publish its indentations where one has grown."""
-        self._contact[:] = answer.contact
-        self._loads[:] = answer.loads
-        self._inside[()] = answer.inside
-        self._depth[()], self._stiffness[()], self._let_go[()] = answer.depth, answer.stiffness, answer.let_go
+        views, self._loads[:] = self._views, answer.loads
+        views["contact"][:], views["inside"][()], views["let_go"][()] = (
+            answer.contact,
+            answer.inside,
+            answer.let_go,
+        )
+        views["depth"][()], views["stiffness"][()] = answer.depth, answer.stiffness
         if answer.grew:
             count = len(answer.indentation)
             self._indentation.record["count"] = count
@@ -84,18 +80,15 @@ class Publisher:
 
     def clamped(self, acted: bool) -> None:
         """Take over whether the force limit acted, and count it."""
-        self._clamped[()] = acted
+        self._views["clamped"][()] = acted
         if acted:
             self.record["clamped_ticks"] += 1
 
     def stiffness(self, bounds: FeltStiffness) -> None:
         """Take over how stiff the body is and may be, and through which spring it is touched."""
         record = self.record
-        record["delay"], record["body_stiffness"], record["coupling"] = (
-            bounds.delay,
-            bounds.body,
-            bounds.coupling,
-        )
+        record["delay"], record["body_stiffness"] = bounds.delay, bounds.body
+        record["coupling"] = bounds.coupling
         record["device_damping"] = math.nan if bounds.damping is None else bounds.damping
         record["unsoftened"], record["nominal_rate"] = bounds.override, bounds.rate
         record["device_stiffness"] = bounds.stated
@@ -103,7 +96,7 @@ class Publisher:
 
     def passivity(self, controller: PassivityController) -> None:
         """Take over the energy ledger and the damping that it asked for."""
-        self._ledger[:] = controller.ledger
+        self._views["ledger"][:] = controller.ledger
 
     def begin_blend(self) -> int:
         """Say that another surrogate takes over with the tick that begins now; return its number."""
@@ -126,11 +119,12 @@ class Publisher:
         The lateness of a `resting` loop, which no hand could feel, is not counted.
         """
         self._count += 1
-        self._tick[()], self._time[()], self._lateness[()] = self._count, now + self.offset, lateness
-        self._idle[()] = resting
+        views = self._views
+        views["tick"][()], views["time"][()] = self._count, now + self.offset
+        views["lateness"][()], views["idle"][()] = lateness, resting
         if not resting:
             self._late.add(lateness)
-        self._worst[()] = self._late.maximum
+        views["lateness_max"][()] = self._late.maximum
         if self._count == 1:
             self._since = now
         if fault is not self._before:
@@ -141,24 +135,24 @@ class Publisher:
 
     def worked(self, duration: float) -> None:
         """Count the CPU time, s, of the tick just published; it appears with the next."""
-        self._work[()] = duration
+        self._views["work"][()] = duration
         self._worked.add(duration)
 
     def end(self) -> None:
         """Publish a last record: nothing held, nothing pushed."""
-        self._grabbed[()] = False
+        self._views["grabbed"][()] = False
         if self._count < _EVERY:
-            self._pace(float(self._time) - self.offset)
+            self._pace(float(self._views["time"]) - self.offset)
         self._block.publish()
 
     def stay(self, now: float) -> None:
         """Publish the last record again, as of `now`, s."""
-        self._time[()] = now
+        self._views["time"][()] = now
         self._block.publish()
 
     def _changed(self, fault: Fault, now: float) -> None:
         self._before = fault
-        self._fault[()] = fault
+        self._views["fault"][()] = fault
         if fault is not Fault.NONE:
             place = self.record["faults"] % ONSETS
             self.record["onset_times"][place], self.record["onset_kinds"][place] = now, fault

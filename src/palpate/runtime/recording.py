@@ -26,7 +26,6 @@ import numpy as np
 
 from palpate.devices.device import Device, Sample, Traits
 from palpate.devices.tick_record import FLAGS, TICK
-from palpate.errors import DeviceError
 from palpate.network import shared_memory
 from palpate.runtime.realtime import obtain_beside
 from palpate.runtime.snapshot import snapshot
@@ -34,11 +33,7 @@ from palpate.runtime.snapshot import snapshot
 if TYPE_CHECKING:
     from palpate.runtime.loop import Loop
 
-__all__ = [
-    "RecordedDevice",
-    "Ring",
-    "TickRecorder",
-]
+__all__ = ["RecordedDevice", "Ring", "TickRecorder"]
 
 _BIT = {name: 1 << k for k, name in enumerate(FLAGS)}
 
@@ -79,27 +74,12 @@ class Ring:
     @classmethod
     def create(cls, rate: float) -> Ring:
         """Make a ring that holds some seconds of ticks at `rate` (Hz)."""
-        try:
-            return cls.attach(shared_memory.create(_MAGIC, _size(rate)))
-        except OSError as error:
-            raise DeviceError(
-                "No shared memory for a recording.",
-                why=str(error),
-                fix=f"Free some space in {shared_memory.folder()}.",
-            ) from error
+        return cls.attach(shared_memory.create_for("a recording", _MAGIC, _size(rate)))
 
     @classmethod
     def attach(cls, name: str) -> Ring:
         """Join a ring made by `create` in another process; one of another version of palpate is a DeviceError."""
-        try:
-            memory = shared_memory.attach(name, _MAGIC)
-        except (OSError, ValueError) as error:
-            raise DeviceError(
-                f"There is no ring named {name!r}.",
-                why=str(error),
-                fix="Its owner has ended, or is of another installation.",
-            ) from error
-        return cls(name, memory)
+        return cls(name, shared_memory.attach_to("ring", name, _MAGIC))
 
     @classmethod
     def private(cls, rate: float = 1000.0) -> Ring:

@@ -16,7 +16,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from palpate.kernels import part
 
 __all__ = ["NOISE_STATE", "forget_motion", "measure_noise"]
 
@@ -29,10 +30,8 @@ _MEMORY = 1.0  # s, in which a level that has passed is forgotten
 _OUTLIER = 9.0  # of the mean square: more counts as this
 _FLOOR = 1e-6  # m: levels below are as good as none, and from here on a level can grow
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
-
-@_jit
+@part
 def measure_noise(state, position, elapsed) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Take a place (3,), m, into `state` (NOISE_STATE,); return the standard deviation along one axis, m."""
     square = 0.0

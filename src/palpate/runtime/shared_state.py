@@ -14,8 +14,7 @@ import time
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self
+from typing import Annotated, Any, Self, TypeAlias, get_origin, get_type_hints
 
 import numpy as np
 
@@ -27,80 +26,11 @@ from palpate.runtime.loop_report import BINS, percentile
 from palpate.runtime.safety import Fault
 from palpate.runtime.stability import FeltStiffness
 
-__all__ = [
-    "COMMAND",
-    "INDENTATION",
-    "MAX_PLACES",
-    "STATE",
-    "Block",
-    "Shared",
-    "State",
-    "now",
-    "size_of",
-]
+__all__ = ["COMMAND", "INDENTATION", "MAX_PLACES", "STATE", "Block", "Shared", "State", "now", "size_of"]
 
 MAX_PLACES = 4096
 FAULT_KINDS = 16
 ONSETS = 32  # of faults, whose times are kept
-
-STATE = np.dtype(
-    [
-        ("tick", "i8"),
-        ("time", "f8"),  # s, `now()` when the tick began
-        ("hand", "f8", 3),  # m, device coordinates
-        ("position", "f8", 3),  # m, body: offset from the touched node's rest position, or the probe's centre
-        ("contact", "f8", 3),  # m, body: where the touched node is, or the probe's centre
-        ("force", "f8", 3),  # N on the hand, as sent, in the body's axes
-        ("depth", "f8"),  # m, of a probe in the surface at rest; 0 for a body held at a node
-        ("stiffness", "f8"),  # N/m, felt along the force in body metres; 0 where it isn't known
-        ("loads", "f8", MAX_INPUTS),  # N, the loads that hold the body there
-        ("inside", "u1"),  # within the trained range
-        ("let_go", "u1"),  # the body has let go of a probe that is too deep in it
-        ("clamped", "u1"),  # the force limit acted
-        ("grabbed", "u1"),  # a hand holds the body
-        ("stalled", "u1"),  # the input is older than its device allows
-        ("fault", "i4"),  # `Fault` of this tick
-        ("last_fault", "i4"),  # the latest that was not NONE
-        ("faults", "i8"),  # onsets since the start
-        ("fault_counts", "i8", FAULT_KINDS),  # the same by kind
-        ("onset_times", "f8", ONSETS),  # s, of the latest onsets: number k is at k modulo their count
-        ("onset_kinds", "i4", ONSETS),
-        ("withheld", "i4"),  # `Fault` that took the force, until it may come back
-        ("waiting", "u1"),  # no force until the hand is where the body holds no energy
-        ("stopped", "u1"),  # no force until a person resumes
-        ("released", "u1"),  # no force until the dead-man button is held
-        ("idle", "u1"),  # nobody touches: the loop ticks more slowly
-        ("words", "S160"),  # of the driver's latest error, UTF-8
-        ("device", "S48"),  # what the device calls itself, UTF-8
-        ("clamped_ticks", "i8"),
-        ("lateness", "f8"),  # s, this tick's start behind its schedule
-        ("lateness_max", "f8"),
-        ("work", "f8"),  # s, CPU time of the tick before
-        ("rate", "f8"),  # Hz, achieved
-        ("scale", "f8"),  # metres of body per metre of hand
-        ("radius", "f8"),  # m, the hand's workspace
-        ("max_force", "f8"),  # N
-        ("ledger", "f8", LEDGER),  # of the passivity controller, see `State`
-        ("delay", "f8"),  # s, measured, from the device's sample to its force
-        ("delay_known", "u1"),  # it was stated or measured
-        ("uncontrolled", "u1"),  # the passivity controller only counts
-        ("device_damping", "f8"),  # N·s/m; NaN for a device without motors
-        ("device_stiffness", "f8"),  # N/m, the largest that its maker states; inf: none
-        ("body_stiffness", "f8"),  # N/m in hand metres, the body's largest; 0 where it isn't known
-        ("nominal_rate", "f8"),  # Hz, as asked
-        (
-            "coupling",
-            "f8",
-        ),  # N/m in hand metres, of the spring in front of a body that is too stiff; inf: none
-        ("unsoftened", "u1"),  # the body shall feel as stiff as it is
-        ("blending", "u1"),  # another surrogate takes the place of the one in the hand
-        ("swaps", "i8"),  # surrogates that have taken another one's place
-        ("added", "f8"),  # J, that blending has given the body, in all
-        ("histogram", "i8", BINS),  # lateness, `Histogram` bins
-        ("work_histogram", "i8", BINS),
-    ],
-    align=True,
-)
 
 INDENTATION = np.dtype(
     [
@@ -127,63 +57,71 @@ COMMAND = np.dtype(
 )
 
 
+_Count: TypeAlias = Annotated[int, "i8"]
+_Kind: TypeAlias = Annotated[int, "i4"]
+_Number: TypeAlias = Annotated[float, "f8"]
+_Flag: TypeAlias = Annotated[bool, "u1"]
+_Vector: TypeAlias = Annotated[np.ndarray, "f8", 3]
+
+
 @dataclass(frozen=True, eq=False)
 class State:
-    """One published tick, copied out of the shared memory. Fields and units as in `STATE`.
+    """One published tick, copied out of the shared memory, whose record is `STATE`.
 
     Percentiles are taken here, by the reader, and not in the loop.
     """
 
-    tick: int
-    time: float
-    hand: np.ndarray
-    position: np.ndarray
-    contact: np.ndarray
-    force: np.ndarray
-    depth: float
-    stiffness: float
-    loads: np.ndarray
-    inside: bool
-    let_go: bool
-    clamped: bool
-    grabbed: bool
-    stalled: bool
-    fault: int
-    last_fault: int
-    faults: int
-    fault_counts: np.ndarray
-    onset_times: np.ndarray
-    onset_kinds: np.ndarray
-    withheld: int
-    waiting: bool
-    stopped: bool
-    released: bool
-    idle: bool
-    words: str
-    device: str
-    clamped_ticks: int
-    lateness: float
-    lateness_max: float
-    work: float
-    rate: float
-    scale: float
-    radius: float
-    max_force: float
-    ledger: np.ndarray
-    delay: float
-    delay_known: bool
-    uncontrolled: bool
-    device_damping: float
-    device_stiffness: float
-    body_stiffness: float
-    nominal_rate: float
-    coupling: float
-    unsoftened: bool
-    blending: bool
-    swaps: int
-    added: float
-    histogram: np.ndarray
-    work_histogram: np.ndarray
+    tick: _Count
+    time: _Number  # s, `now()` when the tick began
+    hand: _Vector  # m, device coordinates
+    position: _Vector  # m, body: offset from the touched node's rest position, or the probe's centre
+    contact: _Vector  # m, body: where the touched node is, or the probe's centre
+    force: _Vector  # N on the hand, as sent, in the body's axes
+    depth: _Number  # m, of a probe in the surface at rest; 0 for a body held at a node
+    stiffness: _Number  # N/m, felt along the force in body metres; 0 where it isn't known
+    loads: Annotated[np.ndarray, "f8", MAX_INPUTS]  # N, the loads that hold the body there
+    inside: _Flag  # within the trained range
+    let_go: _Flag  # the body has let go of a probe that is too deep in it
+    clamped: _Flag  # the force limit acted
+    grabbed: _Flag  # a hand holds the body
+    stalled: _Flag  # the input is older than its device allows
+    fault: _Kind  # `Fault` of this tick
+    last_fault: _Kind  # the latest that was not NONE
+    faults: _Count  # onsets since the start
+    fault_counts: Annotated[np.ndarray, "i8", FAULT_KINDS]  # the same by kind
+    # s, of the latest onsets: number k is at k modulo their count
+    onset_times: Annotated[np.ndarray, "f8", ONSETS]
+    onset_kinds: Annotated[np.ndarray, "i4", ONSETS]
+    withheld: _Kind  # `Fault` that took the force, until it may come back
+    waiting: _Flag  # no force until the hand is where the body holds no energy
+    stopped: _Flag  # no force until a person resumes
+    released: _Flag  # no force until the dead-man button is held
+    idle: _Flag  # nobody touches: the loop ticks more slowly
+    words: Annotated[str, "S160"]  # of the driver's latest error, UTF-8
+    device: Annotated[str, "S48"]  # what the device calls itself, UTF-8
+    clamped_ticks: _Count
+    lateness: _Number  # s, this tick's start behind its schedule
+    lateness_max: _Number
+    work: _Number  # s, CPU time of the tick before
+    rate: _Number  # Hz, achieved
+    scale: _Number  # metres of body per metre of hand
+    radius: _Number  # m, the hand's workspace
+    max_force: _Number  # N
+    ledger: Annotated[np.ndarray, "f8", LEDGER]  # of the passivity controller, see `State`
+    delay: _Number  # s, measured, from the device's sample to its force
+    delay_known: _Flag  # it was stated or measured
+    uncontrolled: _Flag  # the passivity controller only counts
+    device_damping: _Number  # N·s/m; NaN for a device without motors
+    device_stiffness: _Number  # N/m, the largest that its maker states; inf: none
+    body_stiffness: _Number  # N/m in hand metres, the body's largest; 0 where it isn't known
+    nominal_rate: _Number  # Hz, as asked
+    coupling: _Number  # N/m in hand metres, of the spring in front of a body that is too stiff; inf: none
+    unsoftened: _Flag  # the body shall feel as stiff as it is
+    blending: _Flag  # another surrogate takes the place of the one in the hand
+    swaps: _Count  # surrogates that have taken another one's place
+    added: _Number  # J, that blending has given the body, in all
+    histogram: Annotated[np.ndarray, "i8", BINS]  # lateness, `Histogram` bins
+    work_histogram: Annotated[np.ndarray, "i8", BINS]
     indentation: np.ndarray  # (n,) √J, of the indentation at each place; empty where nothing has yielded
 
     @property
@@ -300,6 +238,15 @@ class State:
         return cls(**values, indentation=indentation["amplitude"][: indentation["count"]].astype(float))
 
 
+def _record_of(kind: type) -> np.dtype[np.void]:
+    """Return the record of a class, whose annotations say how each number is stored."""
+    hints = get_type_hints(kind, include_extras=True).items()
+    return np.dtype(
+        [(name, *hint.__metadata__) for name, hint in hints if get_origin(hint) is Annotated], align=True
+    )
+
+
+STATE = _record_of(State)
 _DRIVER = (Fault.DEVICE_ERROR, Fault.DEVICE_STOPPED, Fault.DEVICE_LOST)  # whose words say more
 
 
@@ -344,15 +291,7 @@ class Shared:
         DeviceError
             If the system gives no shared memory.
         """
-        try:
-            name = shared_memory.create(_MAGIC, _SIZE)
-        except OSError as error:
-            raise DeviceError(
-                "No shared memory for the real-time process.",
-                why=str(error),
-                fix=f"Free some space in {shared_memory.folder()}.",
-            ) from error
-        shared = cls.attach(name)
+        shared = cls.attach(shared_memory.create_for("the real-time process", _MAGIC, _SIZE))
         shared.command.record["parameters"] = np.nan
         shared.command.publish()
         shared.state.publish()
@@ -368,16 +307,7 @@ class Shared:
         DeviceError
             If there are none of that name, or another version of palpate made them.
         """
-        try:
-            memory = shared_memory.attach(name, _MAGIC, _SIZE)
-        except (OSError, ValueError) as error:
-            raise DeviceError(
-                f"There is no shared memory named {name!r}.",
-                why=str(error),
-                fix="Its owner has ended, or is of another installation; start the real-time process through "
-                "palpate.runtime.LoopProcess.",
-            ) from error
-        return cls(name, memory)
+        return cls(name, shared_memory.attach_to("shared memory", name, _MAGIC, _SIZE))
 
     @classmethod
     def private(cls) -> Shared:
@@ -475,8 +405,6 @@ class Shared:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
         self.unlink()

@@ -134,10 +134,7 @@ def _ours(value: Any) -> bool:
         return False
     return not (
         dataclasses.is_dataclass(value) and kind.__dataclass_params__.frozen
-    ) and kind.__name__ not in {
-        "Block",
-        "Shared",
-    }
+    ) and kind.__name__ not in {"Block", "Shared"}
 
 
 def _setter(owner: Any, name: str) -> Callable[[Any], None]:

@@ -34,6 +34,8 @@ __all__ = ["Touchable", "load_touchable", "touchable"]
 _SHARE = 0.75  # of the deepest trained depth: how deep a scripted stroke goes
 _WAY, _PAUSE = 9, 0.1  # places on the way to an end, and the time from one to the next, s
 _SLIVER = 1e-3  # of the deepest depth: shallower is no press
+_STEEPEST = 10.0  # slope of a depth: 1 for a distance, and 6 was measured behind flat bodies
+_NEAR = 32  # rows near the middle of the ranges that are answered before all others
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,10 +161,8 @@ class Touchable:
         """Centre of a probe at first contact in the middle of the touched place, and the outer normal there."""
         if self.holds:
             return np.zeros(3), np.array([0.0, 0.0, 1.0])
-        X = self.trained_inputs
-        low, high = bounds(self.inputs)
         # the middle of the ranges where that is a press; on a curved body it may lie too deep
-        x = X[np.argmin((((X - (low + high) / 2.0) / (high - low)) ** 2).sum(axis=1))]
+        x = self._nearest_press()
         if self.surface is None:  # a probe that is felt without a surface: it comes against its force
             force = self.energy.force(x[None])[0]
             normal = force / np.linalg.norm(force)
@@ -170,6 +170,24 @@ class Touchable:
         distance, slope, _ = self.surface.at(x[None, :3])
         normal = slope[0] / np.linalg.norm(slope[0])
         return x[:3] + (self.radius - distance[0]) * normal, normal
+
+    def _nearest_press(self) -> np.ndarray:
+        """Return the one of `trained_inputs` that is nearest to the middle of the ranges.
+
+        Among the rows near the middle it is sought first: these are answered sooner than all.
+        """
+        low, high = bounds(self.inputs)
+        if self.surface is not None:
+            rows = self.energy.trained_rows()
+            near = rows[np.argsort(_from_middle(rows, low, high), kind="stable")[:_NEAR]]
+            depth = self.depth(near)
+            press = self.energy.inside(near) & (depth > 0.0)
+            first = int(np.argmax(press))
+            deepest = depth[first] + _STEEPEST * float(np.linalg.norm(high - low))  # of all rows, at most
+            if press[first] and depth[first] > _SLIVER * deepest:
+                return np.asarray(near[first])
+        X = self.trained_inputs
+        return np.asarray(X[np.argmin(_from_middle(X, low, high))])
 
     @property
     def home(self) -> np.ndarray:
@@ -208,9 +226,9 @@ class Touchable:
         """The memory of its indentation; None for a body that keeps none."""
         return self.memory if self.memory is not None and self.memory.keeps_indentation else None
 
-    def evaluator(self) -> HandEvaluator:
-        """Return the allocation-free evaluator of the 1 kHz path."""
-        elastic, memory = self.energy.evaluator(), None if self.memory is None else self.memory.start()
+    def evaluator(self, *, few: bool = False) -> HandEvaluator:
+        """Return the allocation-free evaluator of the 1 kHz path; one for a `few` places waits for no compiler."""
+        elastic, memory = self.energy.evaluator(few=few), None if self.memory is None else self.memory.start()
         if self.holds:
             # lengths among the further inputs of what is held say where it is held
             places = tuple(i for i, r in enumerate(self.parameters) if r.unit == "m")
@@ -226,6 +244,7 @@ class Touchable:
             inner=self.energy.baseline.inner,
             radius=self.energy.baseline.radius,
             radius_input=self.radius_parameter,
+            few=few,
         )
 
     @cached_property
@@ -276,6 +295,11 @@ class Touchable:
             return {}
         x, y, z = (-self.normal).tolist()
         return {"amplitude": _SHARE * self.deepest / scale, "x": x, "y": z, "z": -y}
+
+
+def _from_middle(X: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return the squared distances (N,) of rows X (N, n) from the middle of ranges, in units of these."""
+    return np.asarray((((X - (low + high) / 2.0) / (high - low)) ** 2).sum(axis=1))
 
 
 def touchable(model: Surrogate, name: str = "") -> Touchable:

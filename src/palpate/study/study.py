@@ -140,6 +140,11 @@ class Study(Record):
         if not kept and not self.test.random:
             raise ValueError("test.every and test.random are both 0: nothing is kept for testing")
 
+    @property
+    def presses(self) -> bool:
+        """True where a probe presses the body, which is else held."""
+        return isinstance(self.sweep, ProbeSweepRecord)
+
     def problem(self, *, whole: bool = False) -> Any:
         """Return the problem to solve: the body, or a family of bodies, under what acts on it.
 

@@ -24,13 +24,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from palpate.errors import UsageError
+from palpate.kernels import for_rows, kernel, part
 
 __all__ = ["ContactLaw", "choices", "crossing_length", "law_at"]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 # twice the power p, and the factor f
 _POWERS = {"square": (4.0, 0.5), "hertz": (5.0, 1.0), "pad": (6.0, 1.0), "series": (6.0, 1.0)}
@@ -105,7 +104,7 @@ class ContactLaw:
         """U₀, U₀' and U₀'' at depths s (m) of any shape; all zero where s ≤ 0."""
         s = np.asarray(s, dtype=np.float64)
         out = np.empty((3, s.size))
-        _laws_into(s.ravel(), out, *self.numbers())
+        for_rows(_laws_into, s.size)(s.ravel(), out, *self.numbers())
         return out[0].reshape(s.shape), out[1].reshape(s.shape), out[2].reshape(s.shape)
 
     def log(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -129,7 +128,7 @@ class ContactLaw:
         return value, (p - 0.5 * r) / s, (0.5 * r * r - p) / (s * s)
 
 
-@_jit
+@part
 def law_at(s, twice, factor, length) -> tuple[float, float, float]:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """U₀, U₀' and U₀'' at one depth s (m): zero where s ≤ 0, not-a-number where s is."""
     if s <= 0.0:
@@ -144,7 +143,7 @@ def law_at(s, twice, factor, length) -> tuple[float, float, float]:  # type: ign
     return g * s * s, g * s * (p - 0.5 * r), g * (p * (p - 1.0) - p * r + 0.75 * r * r)
 
 
-@_jit
+@kernel
 def _laws_into(s, out, twice, factor, length) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """`law_at` for depths s (N,) into out (3, N)."""
     for i in range(s.size):

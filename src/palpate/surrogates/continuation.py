@@ -32,15 +32,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
+from palpate.kernels import part
 from palpate.units import Range
 
 __all__ = ["Continuation", "saturated"]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 _SHARE = 0.25  # part of a range or of the deepest depth, to which ℓ is followed beyond it
 
 
@@ -97,7 +96,7 @@ class Continuation:
         return cls(share * spans, deepest, share * deepest if math.isfinite(deepest) else 1.0)
 
 
-@_jit
+@part
 def saturated(t, edge, width) -> tuple[float, float, float]:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """σ, σ' and σ'' at t, for the upper edge of a range."""
     if t <= edge:

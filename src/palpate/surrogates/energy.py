@@ -21,6 +21,7 @@ import numpy as np
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.format import count
+from palpate.kernels import for_rows
 from palpate.network import Network, TrainedRegion
 from palpate.network.network_kernels import gram
 from palpate.processes import available_cores
@@ -164,7 +165,8 @@ class LearntEnergy:
 
     def _fill(self, X: np.ndarray, answers: np.ndarray, inside: np.ndarray) -> None:
         """Fill answers (N, 19) and inside (N,) of places and parameters X (N, 3 + p)."""
-        entry_of(self.baseline.compiled()).rows(X, answers, inside, *self.compiled())
+        entry = entry_of(self.baseline.compiled())
+        for_rows(entry.rows, len(X), entry.one)(X, answers, inside, *self.compiled())
 
     def _answers(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return checked inputs (N, n), answers (N, 19) and inside (N,)."""
@@ -256,7 +258,7 @@ class LearntEnergy:
         X, answers, _ = self._answers(X)
         root, net = self._compiled_posterior()
         out, columns = np.empty((len(X), *shape)), np.zeros((4, root.shape[1]))
-        kernel(X, answers, out, root, columns, self._constants[3], net)
+        for_rows(kernel, len(X))(X, answers, out, root, columns, self._constants[3], net)
         return out
 
     def _compiled_posterior(self) -> tuple[np.ndarray, tuple[Any, ...]]:
@@ -283,8 +285,12 @@ class LearntEnergy:
         )
         return self.root[: tail + count] * self.network.scaling.output_scale[0], some
 
-    def evaluator(self) -> EnergyEvaluator:
-        """Return the allocation-free evaluator of the 1 kHz path."""
+    def evaluator(self, *, few: bool = False) -> EnergyEvaluator:
+        """Return the allocation-free evaluator of the 1 kHz path.
+
+        One for a `few` places does not wait for a compiler: it interprets the kernels that are not compiled.
+        """
         somewhere = self._places(np.array([[r.low for r in self.inputs]]))[0]
-        entry = entry_of(self.baseline.compiled())
-        return EnergyEvaluator(entry.one, self.compiled(), self._compiled_posterior(), somewhere)
+        one = entry_of(self.baseline.compiled()).one
+        one = for_rows(one, 1) if few else one
+        return EnergyEvaluator(one, self.compiled(), self._compiled_posterior(), somewhere)

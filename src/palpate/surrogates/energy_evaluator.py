@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.kernels import for_rows
 from palpate.surrogates.arguments import NONE, place_at
 from palpate.surrogates.energy_kernels import (
     AMPLITUDE,
@@ -75,7 +76,7 @@ class EnergyEvaluator:
         # the kernels keep the network's inputs in the first line
         self._posterior = (lines[0], root, np.zeros((4, root.shape[1])), axes, net)
         # compile now, not in the loop
-        self.trust(somewhere[:3].copy(), somewhere[3:].copy())
+        self(somewhere[:3].copy(), somewhere[3:].copy())
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray = NONE) -> None:
         """Evaluate at a place; float64 arrays are taken as they are, other sequences are converted.
@@ -106,7 +107,7 @@ class EnergyEvaluator:
             As a call.
         """
         self(position, parameters)
-        return trust_at(self._answer, *self._posterior)
+        return for_rows(trust_at, 1)(self._answer, *self._posterior)
 
     @property
     def energy(self) -> float:

@@ -34,8 +34,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from numba import njit
-
+from palpate.kernels import kernel, part
 from palpate.network.network_kernels import combine_lines, regressors_into, second_order_into
 from palpate.surrogates.continuation import saturated
 
@@ -65,7 +64,6 @@ __all__ = [
     "trusts_into",
 ]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 ANSWER, FORCE, STIFFNESS = 19, slice(2, 5), slice(5, 14)  # numbers of an answer, and places in it
 PLAIN, AMPLITUDE, SLOPE = 14, 15, slice(16, 19)
@@ -118,7 +116,7 @@ class Entry(NamedTuple):
     rows: Callable[..., None]
 
 
-@_jit
+@part
 def _box(lines, limits) -> None:
     """Saturate every input of line 1 beyond its range; slopes and curvatures into lines 2 and 3."""
     for i in range(lines.shape[1]):
@@ -130,7 +128,7 @@ def _box(lines, limits) -> None:
             lines[1, i], lines[2, i], lines[3, i] = saturated(t, high, width)
 
 
-@_jit
+@part
 def _through_box(felt, lines) -> None:
     """Take ∇ℓ and ∇²ℓ by x̃ to those by what came before the saturation of the ranges."""
     k = felt.shape[1]
@@ -142,7 +140,7 @@ def _through_box(felt, lines) -> None:
         felt[0, i] *= lines[2, i]
 
 
-@_jit
+@part
 def _to_space(felt, axes, small) -> None:
     """Take ∇ℓ and ∇²ℓ by felt coordinates u = D x to those by the place x."""
     k = axes.shape[0]
@@ -166,7 +164,7 @@ def _to_space(felt, axes, small) -> None:
             H[i, j] = total
 
 
-@_jit
+@part
 def _assemble(answer, kappa, base, small) -> None:
     """Fill U, F, ∂F/∂x and q from the baseline's and the factor's derivatives; symmetric to the last bit."""
     B, H, b, g = small[HESSIAN], small[LOG], small[VECTORS, GRADIENT], small[VECTORS, _SLOPE]
@@ -183,7 +181,7 @@ def _assemble(answer, kappa, base, small) -> None:
         answer[AMPLITUDE + 1 + i] = root * (small[ROOT, 0, i] + 0.5 * base[3] * g[i])
 
 
-@_jit
+@part
 def _near(x, points, radius, last) -> bool:
     """Return True where a trained point is within the radius; the search begins where it last ended."""
     S = points.shape[0]
@@ -199,7 +197,7 @@ def _near(x, points, radius, last) -> bool:
     return bool(S == 0)
 
 
-@_jit
+@part
 def _inside(lines, limits, s, numbers, points, scales, small) -> bool:
     """Return True where x (line 0) is in its ranges, as deep as trained, and near a training input; line 1 is lost."""
     if s > numbers[_DEEPEST] * (1.0 + _SLACK):
@@ -212,7 +210,7 @@ def _inside(lines, limits, s, numbers, points, scales, small) -> bool:
     return bool(_near(lines[1], points, numbers[_REGION], small[MORE, _LAST]))
 
 
-@_jit
+@part
 def _gather(position, parameters, axes, lines) -> bool:
     """Put the network's inputs into line 0; whether all that came is finite."""
     k = axes.shape[0]
@@ -224,7 +222,7 @@ def _gather(position, parameters, axes, lines) -> bool:
     return finite
 
 
-@_jit
+@part
 def _feel(position, axes, line) -> None:
     """Put the felt coordinates u = D x at the beginning of a line."""
     if axes.shape[0] == 3:
@@ -235,17 +233,17 @@ def _feel(position, axes, line) -> None:
         line[a] = axes[a, 0] * position[0] + axes[a, 1] * position[1] + axes[a, 2] * position[2]
 
 
-@_jit
+@part
 def _no_rest(position, xi, base, small, args) -> None:
     pass
 
 
-@_jit
+@part
 def _no_log(xi, g, H, scales, args) -> float:
     return 0.0
 
 
-@_jit
+@part
 def _no_leave(position, base, small, numbers, args) -> None:
     pass
 
@@ -337,18 +335,15 @@ def entry_of(compiled: Compiled) -> Entry:
         first = compiled.enter or compiled.kernel
         assert first is not None
         name = f"{first.__module__}.{first.__name__}_{_checksum(hooks)}".replace(".", "_")
-        enter = compiled.enter or _bound(_plain_enter, name, {"baseline_kernel": compiled.kernel})
-        one = _bound(
-            _one,
-            name,
-            {
-                "baseline_enter": enter,
-                "baseline_rest": compiled.rest or _no_rest,
-                "baseline_log": compiled.log or _no_log,
-                "baseline_leave": compiled.leave or _no_leave,
-            },
-        )
-        _entries[hooks] = Entry(one, _bound(_rows, name, {"answer_one": one}))
+        enter = compiled.enter or part(_bound(_plain_enter, name, {"baseline_kernel": compiled.kernel}))
+        kernels = {
+            "baseline_enter": enter,
+            "baseline_rest": compiled.rest or _no_rest,
+            "baseline_log": compiled.log or _no_log,
+            "baseline_leave": compiled.leave or _no_leave,
+        }
+        one = kernel(_bound(_one, name, kernels))
+        _entries[hooks] = Entry(one, kernel(_bound(_rows, name, {"answer_one": one})))
     return _entries[hooks]
 
 
@@ -362,14 +357,14 @@ def _checksum(hooks: tuple[Any, ...]) -> str:
 
 
 def _bound(template: Callable[..., Any], name: str, hooks: dict[str, Any]) -> Callable[..., Any]:
-    """Compile a template with its hooks as globals, under a name of its own."""
+    """Return a template with its hooks as globals, under a name of its own."""
     own = f"{template.__name__}_{name}"
     function = FunctionType(template.__code__, template.__globals__ | hooks, own)
     function.__qualname__, function.__module__ = own, template.__module__
-    return _jit(function)
+    return function
 
 
-@_jit
+@part
 def _move(answer, x, root, columns, axes, net) -> None:
     """Put F a − U b of each of the root's columns into columns[1:4] (3, z).
 
@@ -392,7 +387,7 @@ def _move(answer, x, root, columns, axes, net) -> None:
             columns[1 + i, z] = answer[2 + i] * columns[0, z] - value * along
 
 
-@_jit
+@kernel
 def trust_at(answer, x, root, columns, axes, net) -> float:
     """Relative deviation of the force in `answer` at inputs x (n,): √(Σ ‖F a − U b‖²)/‖F‖, zero without a force.
 
@@ -412,14 +407,14 @@ def trust_at(answer, x, root, columns, axes, net) -> float:
     return math.sqrt(total) / size
 
 
-@_jit
+@kernel
 def trusts_into(X, answers, out, root, columns, axes, net) -> None:
     """`trust_at` for each row of inputs X (N, n) into out (N,)."""
     for i in range(X.shape[0]):
         out[i] = trust_at(answers[i], X[i], root, columns, axes, net)
 
 
-@_jit
+@kernel
 def covariances_into(X, answers, out, root, columns, axes, net) -> None:
     """Covariance Σ (F a − U b)(F a − U b)ᵀ of the force for each row of inputs X (N, n) into out (N, 3, 3), N²."""
     for row in range(X.shape[0]):

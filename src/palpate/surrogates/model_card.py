@@ -11,7 +11,7 @@ import json
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -124,7 +124,7 @@ def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard
     parts = _of_body(model, meta) if hasattr(model, "energy") else _of_network(network, meta)
     inputs: Sequence[Range] = parts.pop("inputs")
     answers = {
-        "inputs": [{"name": r.name, "low": r.low, "high": r.high, "unit": r.unit} for r in inputs],
+        "inputs": [asdict(r) for r in inputs],
         "outputs": parts.pop("outputs"),
         "inside": parts.pop("inside"),
     }

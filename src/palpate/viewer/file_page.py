@@ -31,7 +31,7 @@ from palpate.files import write_file
 from palpate.format import script_json
 from palpate.output_files import require_outputs, with_seal
 from palpate.runtime.touchable import touchable
-from palpate.surrogates import ContactBaseline, FieldSurrogate, Surrogate
+from palpate.surrogates import FieldSurrogate, Surrogate
 from palpate.surrogates.model_card import card_of
 from palpate.viewer.messages import Hello
 from palpate.viewer.packed_surface import PackedSurface, rounded_points
@@ -192,18 +192,13 @@ def _shallow(surrogate: Surrogate) -> Surrogate:
     """Return the same body, which lets go of a probe about twice as deep as trained: its surface takes less room."""
     baseline, deepest = surrogate.energy.baseline, touchable(surrogate).deepest
     surface = baseline.surface
-    if surface is None or not isinstance(baseline, ContactBaseline):
+    if surface is None:
         return surrogate
     inner = max(DEEP * deepest - surface.radius, 2 * surface.spacing)
     if inner >= surface.inner:
         return surrogate
-    nearer = replace(surface, inner=inner)
-    energy = replace(surrogate.energy, baseline=replace(baseline, touched=nearer))
-    fields = {
-        name: replace(field, surface=nearer) if isinstance(field, FieldSurrogate) else field
-        for name, field in surrogate.fields.items()
-    }
-    return replace(surrogate, energy=energy, fields=fields)
+    nearer = baseline.with_surface(replace(surface, inner=inner))
+    return surrogate.with_energy(replace(surrogate.energy, baseline=nearer))
 
 
 def _places(model: PageModel) -> dict[str, Any] | None:
@@ -281,7 +276,10 @@ def _document(name: str, parts: Mapping[str, str], card: str) -> str:
         for key, part in parts.items()
     )
     icon = base64.b64encode((STATIC / "favicon.svg").read_bytes()).decode()
+    licence = (STATIC / "THIRD-PARTY.txt").read_text("utf-8")  # of what the script contains
     return f"""<!doctype html>
+<!--
+{licence}-->
 <html lang="en" data-mode="touch" data-file>
 <head>
 <meta charset="utf-8">

@@ -52,7 +52,7 @@ from palpate.viewer.server import body_routes, driver_in_words
 from palpate.viewer.session import Session
 from palpate.viewer.shown_part import PartChoices, ShownPart, choices_of
 from palpate.viewer.solve_dots import on_surface
-from palpate.viewer.traffic import Bucket
+from palpate.viewer.traffic import Bucket, tell_all
 from palpate.viewer.web_server import LocalServer, ServerOptions, local_application, skeleton
 from palpate.viewer.wire import Json
 
@@ -61,7 +61,6 @@ __all__ = ["PartPage", "Progress", "serve_part"]
 logger = logging.getLogger("palpate.viewer")
 
 MOST_PAGES = 32  # pages that are served at a time
-PATIENCE = 1.0  # s that a page has to take news
 # messages of a page, per second and at once; a start after long brushing takes fifty
 MESSAGES, MESSAGES_AT_ONCE = 20.0, 200.0
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
@@ -393,14 +392,7 @@ class PartPage(LocalServer):
 
     def _tell(self, news: Json) -> None:
         """Send a message to all pages, from any thread."""
-        self._do(self._tell_all(news.to_json()))
-
-    async def _tell_all(self, text: str) -> None:
-        async def tell(visitor: _Visitor) -> None:
-            with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
-                await asyncio.wait_for(visitor.socket.send_text(text), PATIENCE)
-
-        await asyncio.gather(*map(tell, list(self._visitors)))
+        self._do(tell_all((visitor.socket for visitor in self._visitors), news.to_json()))
 
     def _do(self, work: Any) -> None:
         """Let the server's thread carry out a coroutine; nothing happens where the server has ended."""

@@ -43,7 +43,7 @@ from palpate.viewer.messages import (
 from palpate.viewer.page_model import PageModel, vector
 from palpate.viewer.page_recording import PageRecording
 from palpate.viewer.part_messages import Ready
-from palpate.viewer.traffic import Bucket, Turns
+from palpate.viewer.traffic import Bucket, Turns, tell_all
 
 __all__ = ["NOT_SOFTENED", "LoopLike", "Page", "Session", "softening"]
 
@@ -54,7 +54,6 @@ SHORTEST = 1.0 / 125.0  # s between frames to one page: no display that matters 
 STALE = 0.25  # s without a tick until the loop counts as frozen
 RATE_KNOWN = 0.5  # s after the loop has rested until its rate is that of a touched body again
 WATCH = 0.1  # s between looks at the real-time process
-PATIENCE = 1.0  # s that a page has to take news of all pages
 GRACE = 0.5  # s; a signal that ends the whole program may reach the real-time process first
 MOST_PAGES = 32  # pages that are served at a time
 # messages of a page, per second and at once; a display at 360 Hz needs 485
@@ -185,14 +184,7 @@ class Session:
         await self._tell_all(ENDED)
 
     async def _tell_all(self, news: Notice | Recording | Hello) -> None:
-        text = news.to_json()
-
-        async def tell(page: Page) -> None:
-            # RuntimeError: just closed; TimeoutError: a page that doesn't read keeps it from nobody else
-            with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
-                await asyncio.wait_for(page.socket.send_text(text), PATIENCE)
-
-        await asyncio.gather(*map(tell, list(self._pages.values())))
+        await tell_all([page.socket for page in self._pages.values()], news.to_json())
 
     def hello(self) -> Hello:
         """Return the first message to every page."""

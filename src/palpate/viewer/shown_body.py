@@ -17,7 +17,7 @@ import numpy as np
 from palpate.dataset.readers.vtk_files import Grid, read_series, read_vtu
 from palpate.errors import FileFormatError, UsageError
 from palpate.viewer.messages import PROTOCOL, FieldInfo, Shown, Step, StepInfo, Surface
-from palpate.viewer.surfaces import Split, outer_triangles, split
+from palpate.viewer.surfaces import Split, split
 
 __all__ = ["ShownBody", "ShownStep", "body_of", "body_of_dataset", "body_of_file"]
 
@@ -93,15 +93,7 @@ class ShownBody:
 
     def surface(self, parts: Split) -> Surface:
         """Return its surface at rest as a message."""
-        return Surface(
-            rest=np.asarray(self.rest)[parts.nodes].ravel(),
-            triangles=parts.triangles.ravel(),
-            creases=parts.creases.ravel(),
-            fixed=parts.fixed.ravel(),
-            touchable=np.zeros(0),
-            yielding=np.zeros(0),
-            normals=np.zeros(0),
-        )
+        return parts.surface(self.rest)
 
     def step(self, index: int, parts: Split) -> Step:
         """Return one state as a message."""
@@ -275,10 +267,12 @@ def _series(path: Path, name: str) -> ShownBody:
 
 
 def _vtu_body(paths: list[Path], labels: list[str], name: str) -> ShownBody:
+    from palpate.physics.shapes.mesh import outer_faces
+
     first = _read(paths[0])
     tetrahedra, flat = ([nodes[:, :n] for k, nodes in first.cells if k == kind] for kind, n in _CORNERS)
     if tetrahedra:
-        triangles = outer_triangles(np.concatenate(tetrahedra))
+        triangles = outer_faces(np.concatenate(tetrahedra))
     elif flat:
         triangles = np.concatenate(flat)
     else:

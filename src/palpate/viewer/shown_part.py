@@ -60,16 +60,7 @@ class ShownPart:
         """Its surface as a message, split along sharp edges; triangles keep their order."""
         triangles = np.asarray(self.triangles, dtype=np.int64)
         points = np.asarray(self.points, dtype=float)
-        parts = split(points, triangles, np.zeros(len(triangles), bool))
-        return Surface(
-            rest=points[parts.nodes].ravel(),
-            triangles=parts.triangles.ravel(),
-            creases=parts.creases.ravel(),
-            fixed=np.zeros(0),
-            touchable=np.zeros(0),
-            yielding=np.zeros(0),
-            normals=np.zeros(0),
-        )
+        return split(points, triangles, np.zeros(len(triangles), bool)).surface(points)
 
     def picks(self) -> PartFaces:
         """Return the faces and the first roles of its triangles as a message; what is held goes over the rest."""

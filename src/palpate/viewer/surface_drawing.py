@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -56,11 +57,8 @@ class SurfaceDrawing:
         if self._keeps_indentation:  # on both sides of a sharp edge, or it would tear
             yielding = np.flatnonzero(np.isin(parts.nodes, parts.nodes[parts.triangles[mark > 0]]))
         indentation = IndentationDrawing(self.body, points[parts.nodes[yielding]]) if len(yielding) else None
-        surface = Surface(
-            rest=points[parts.nodes].ravel(),
-            triangles=parts.triangles.ravel(),
-            creases=parts.creases.ravel(),
-            fixed=np.zeros(0),
+        surface = replace(
+            parts.surface(points),
             touchable=mark,
             yielding=yielding,
             normals=np.zeros(0) if indentation is None else indentation.normals.ravel(),

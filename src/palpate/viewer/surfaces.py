@@ -9,12 +9,11 @@ import numpy as np
 
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import FieldSurrogate
+from palpate.viewer.messages import Surface
 
-__all__ = ["Split", "outer_triangles", "relief", "split", "touchable_triangles"]
+__all__ = ["Split", "relief", "split", "touchable_triangles"]
 
 CREASE = math.cos(math.radians(40.0))
-# faces of a right-handed tetrahedron, counter-clockwise as seen from outside
-FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 ALONG = 48  # cells of a relief along either side
 STEPS = 30  # steps of Newton's method down to the surface
@@ -30,6 +29,19 @@ class Split:
     triangles: np.ndarray  # (t, 3) int, points
     creases: np.ndarray  # (s, 2) int, points at the ends of each sharp edge
     fixed: np.ndarray  # (s, 2) int, points at the ends of each edge around the fixed triangles
+
+    def surface(self, rest: np.ndarray) -> Surface:
+        """Return the surface as a message that marks nothing; `rest` (node, 3) are the body's nodes, m."""
+        none = np.zeros(0)
+        return Surface(
+            rest=np.asarray(rest)[self.nodes].ravel(),
+            triangles=self.triangles.ravel(),
+            creases=self.creases.ravel(),
+            fixed=self.fixed.ravel(),
+            touchable=none,
+            yielding=none,
+            normals=none,
+        )
 
 
 def split(rest: np.ndarray, triangles: np.ndarray, fixed: np.ndarray) -> Split:
@@ -50,13 +62,6 @@ def split(rest: np.ndarray, triangles: np.ndarray, fixed: np.ndarray) -> Split:
     sharp, around = ~smooth, fixed[one] != fixed[two]
     flat = faces.ravel()
     return Split(nodes, faces, flat[first[sharp]], flat[first[around]])
-
-
-def outer_triangles(tetrahedra: np.ndarray) -> np.ndarray:
-    """Return the faces (t, 3) that belong to one tetrahedron (e, 4) only."""
-    faces = tetrahedra[:, FACES].reshape(-1, 3)
-    _, inverse, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return np.asarray(faces[count[inverse.ravel()] == 1])
 
 
 def _pairs(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -17,17 +17,19 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable
 from typing import Any, Protocol
 
 import h11
+from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 
-__all__ = ["Bucket", "Closable", "PatientHttp", "PatientWebSocket", "Turns", "Waiting"]
+__all__ = ["Bucket", "Closable", "PatientHttp", "PatientWebSocket", "Turns", "Waiting", "tell_all"]
 
 Clock = Callable[[], float]
+PATIENCE = 1.0  # s that a page has to take news of all pages
 
 SHARE = 0.5  # share of the thread's time for pictures; the rest is the hand's
 HALF_OPEN = 64  # connections without a whole request, at most
@@ -195,3 +197,14 @@ class PatientWebSocket(WebSocketsSansIOProtocol):
         if not permitted:
             self.transport.abort()
         return permitted
+
+
+async def tell_all(sockets: Iterable[WebSocket], text: str) -> None:
+    """Send a text to all pages at once."""
+
+    async def tell(socket: WebSocket) -> None:
+        # RuntimeError: just closed; TimeoutError: a page that doesn't read keeps it from nobody else
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
+            await asyncio.wait_for(socket.send_text(text), PATIENCE)
+
+    await asyncio.gather(*map(tell, list(sockets)))

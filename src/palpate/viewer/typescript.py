@@ -14,44 +14,17 @@ from palpate.viewer.wire import CODES, Binary, Json, Wire
 
 __all__ = ["generate"]
 
-BINARY: tuple[type[Binary], ...] = (
-    messages.Frame,
-    messages.Hand,
-    messages.Credit,
-    messages.Surface,
-    messages.Step,
-    messages.Modes,
-    messages.RecordWish,
-    messages.StopWish,
-    part_messages.Picks,
-    part_messages.EndWish,
-    part_messages.Ready,
-    part_messages.PartFaces,
-    part_messages.TrustMap,
-)
-JSON: tuple[type[Json], ...] = (
-    messages.Hello,
-    messages.Notice,
-    messages.Recording,
-    messages.Reason,
-    messages.Feel,
-    messages.Shown,
-    part_messages.PartNews,
-    part_messages.PartFacts,
-    part_messages.StartWish,
-    part_messages.UnitWish,
-    part_messages.Answer,
-    part_messages.LearningProgress,
-)
-RECORDS: tuple[type, ...] = (
-    messages.RangeInfo,
-    messages.FieldInfo,
-    messages.Line,
-    messages.StepInfo,
-    part_messages.FaceInfo,
-    part_messages.MaterialInfo,
-)
-ENUMS: tuple[type[IntEnum], ...] = (messages.Loop, messages.Hold, part_messages.Role)
+_DECLARED: list[type[Any]] = [
+    kind
+    for module in (messages, part_messages)
+    for kind in vars(module).values()
+    if isinstance(kind, type) and kind.__module__ == module.__name__
+]
+"""Classes of both modules in their order; the protocols among them are no messages."""
+BINARY: list[type[Binary]] = [kind for kind in _DECLARED if issubclass(kind, Binary)]
+JSON: list[type[Json]] = [kind for kind in _DECLARED if issubclass(kind, Json)]
+ENUMS: list[type[IntEnum]] = [kind for kind in _DECLARED if issubclass(kind, IntEnum)]
+RECORDS = [kind for kind in _DECLARED if not issubclass(kind, Binary | Json | IntEnum)]
 
 # wire type → TypeScript type
 TYPES = dict.fromkeys(CODES, "number") | {

@@ -9,7 +9,7 @@ from solids import FOOT, PROBE, RADIUS, SIZE, above, pressed
 
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.interactions.sphere_contact import Contact
-from palpate.physics.interactions.surface_patch import winding_number
+from palpate.physics.shapes.surface_checks import winding_number
 from palpate.physics.stop import Stop
 
 
@@ -59,8 +59,8 @@ def test_what_counts_is_the_deformed_surface(field):
 
 def test_the_winding_number_tells_inside_from_outside(field):
     mesh = field.rest
-    assert winding_number(mesh.points, mesh.triangles, np.array(SIZE) / 2) == pytest.approx(1)
-    assert winding_number(mesh.points, mesh.triangles, np.array(SIZE) * 1.01) == pytest.approx(0, abs=1e-12)
+    assert winding_number(mesh.points[mesh.triangles], np.array(SIZE) / 2) == pytest.approx(1)
+    assert winding_number(mesh.points[mesh.triangles], np.array(SIZE) * 1.01) == pytest.approx(0, abs=1e-12)
 
 
 @pytest.mark.full

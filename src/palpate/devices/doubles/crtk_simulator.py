@@ -14,6 +14,7 @@ system: foot pedals.
 from __future__ import annotations
 
 import asyncio
+import functools
 import json
 import math
 import threading
@@ -24,8 +25,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.devices.doubles.service_double import HandSettings, MovedMass, ServiceDouble
-from palpate.errors import UsageError
+from palpate.devices.device_options import number
+from palpate.devices.doubles.service_double import HandSettings, MovedMass, ServiceDouble, ServiceFaults
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -40,31 +41,21 @@ _STATES = {"enable": "ENABLED", "disable": "DISABLED", "pause": "PAUSED", "resum
 class CrtkSimulatorSettings(HandSettings):
     """Settings of the bridge, the arm and its hand."""
 
-    silence: float = 1e9  # s without a wrench until the force lapses; CRTK doesn't promise that it ever does
+    # s without a wrench until the force lapses; CRTK doesn't promise that it ever does
+    silence: float = number(1e9, 0.0, above=True)
     weight: float = 2.0  # N, of the limp arm
     port: int = 9090  # of the bridge; 0 takes a free one
     host: str = "127.0.0.1"
     arm: str = "arm"  # namespace
-    rate: float = 1000.0  # Hz, of positions
-    ros: int = 2  # 1 or 2: version of ROS, and so the spelling of types and stamps
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.ros not in {1, 2} or not 1.0 <= self.rate <= 10_000.0:
-            raise UsageError(
-                "The simulated CRTK arm can't be as asked.", fix="ros is 1 or 2, rate is 1 … 10,000 Hz."
-            )
+    rate: float = number(1000.0, 1.0, 10_000.0)  # Hz, of positions
+    ros: int = number(2, 1, 2, whole=True)  # 1 or 2: version of ROS, and so the spelling of types and stamps
 
 
 @dataclass
-class CrtkFaults:
-    """Faults of the chain, switched while it runs."""
+class CrtkFaults(ServiceFaults):
+    """Faults of the chain, switched while it runs; those of answers are those of positions."""
 
-    held: bool = False  # positions are kept back until this is false again; then all are sent
-    dropped: int = 0  # number of the next positions that are lost
-    doubled: int = 0  # number of the next positions that are sent twice
     swapped: int = 0  # number of the next positions that are sent after their successor
-    closing: bool = False  # the next message closes the connection
     deaf: bool = False  # what is published to the bridge is not passed on: no echo
     stampless: bool = False  # headers have stamps of zero
     stateless: bool = False  # there is no operating state
@@ -78,7 +69,7 @@ class CrtkFaults:
 class CrtkSimulator(ServiceDouble):
     """The bridge and the arm, which move and stamp positions by the time, s, that `clock` returns.
 
-    `faults` may be changed at any time. `state`, `homed` and `busy` are the arm's operating state, `port` is in use
+    `state`, `homed` and `busy` are the arm's operating state, `port` is in use
     once started, `wrenches` counts those that have arrived, `stamp` is that of the newest one's header, `absolute` says
     whether they are in the axes of the base, and `limp` whether one has come, after which nothing but wrenches moves
     the arm. `gravity` says whether the arm bears its own weight; `locked` is the orientation that the wrist holds, None
@@ -87,13 +78,10 @@ class CrtkSimulator(ServiceDouble):
     """
 
     def __init__(
-        self,
-        settings: CrtkSimulatorSettings | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        self, settings: CrtkSimulatorSettings | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        super().__init__("CRTK arm")
-        self.settings, self.clock = settings or CrtkSimulatorSettings(), clock
-        self.faults = CrtkFaults()
+        super().__init__("CRTK arm", clock)
+        self.settings, self.faults = settings or CrtkSimulatorSettings(), CrtkFaults()
         self.state, self.homed, self.busy = "ENABLED", True, False
         self.port, self.wrenches, self.absolute = 0, 0, False
         self.limp, self.gravity = False, False
@@ -104,8 +92,6 @@ class CrtkSimulator(ServiceDouble):
         self.topics: dict[str, str] = {}
         self._publishers: dict[str, set[ServerConnection]] = {}
         self._hand = MovedMass(self.settings)
-        self._subscribed: dict[ServerConnection, set[str]] = {}
-        self._kept: list[str] = []
         self._run_up = 0.0
         self._arrived = threading.Condition()
         self._streaming = asyncio.Event()
@@ -142,24 +128,15 @@ class CrtkSimulator(ServiceDouble):
         """Move the hand to the clock's time and send position, velocity and state once."""
         self._do(self._publish_state())
 
-    def release(self) -> None:
-        """Send the positions that were held, in their order."""
-        self.faults.held = False
-        self._do(self._send_kept())
-
     def hang(self) -> None:
         """Send nothing and leave unread what arrives, as a bridge that hangs does."""
 
         async def pause() -> None:
             self._streaming.clear()
-            for client in self._subscribed:
+            for client in self._clients:
                 client.transport.pause_reading()
 
         self._do(pause())
-
-    def restart(self) -> None:
-        """Close all connections, as a restarted bridge does."""
-        self._do(self._drop_clients())
 
     def await_wrenches(self, count: int) -> bool:
         """Wait until that many wrenches have arrived, at most ten seconds."""
@@ -175,15 +152,6 @@ class CrtkSimulator(ServiceDouble):
             self._task.cancel()
         await super()._end()
 
-    async def _drop_clients(self) -> None:
-        for client in list(self._subscribed):
-            await client.close()
-
-    async def _send_kept(self) -> None:
-        kept, self._kept = self._kept, []
-        for text in kept:
-            await self._send(self._prefix + "measured_cp", text)
-
     async def _stream(self) -> None:
         loop = asyncio.get_running_loop()
         due = loop.time()
@@ -194,21 +162,14 @@ class CrtkSimulator(ServiceDouble):
             await asyncio.sleep(max(0.0, due - loop.time()))
 
     async def _bridge(self, connection: ServerConnection) -> None:
-        from websockets.exceptions import ConnectionClosed
-
-        topics = self._subscribed[connection] = set[str]()
-        try:
+        with self._hears(connection) as topics:
             async for text in connection:
                 if self.faults.closing:
                     self.faults.closing = False
                     break
                 await self._obey(connection, topics, json.loads(text))
-        except ConnectionClosed:
-            pass  # a client that is gone takes nothing along
-        finally:
-            self._subscribed.pop(connection, None)
-            for topic in list(self.topics):
-                self._withdraw(topic, connection)
+        for topic in list(self.topics):
+            self._withdraw(topic, connection)
 
     def _withdraw(self, topic: str, connection: ServerConnection) -> None:
         """Forget a client that publishes to a topic, and the topic with the last one."""
@@ -306,33 +267,18 @@ class CrtkSimulator(ServiceDouble):
     async def _publish_pose(self, message: dict[str, Any]) -> None:
         faults, topic = self.faults, self._prefix + "measured_cp"
         text = json.dumps({"op": "publish", "topic": topic, "msg": message})
-        if faults.held:
-            self._kept.append(text)
-        elif faults.dropped > 0:
-            faults.dropped -= 1
-        elif faults.swapped > 0:
+        send = functools.partial(self._send, topic)
+        if faults.swapped > 0:
             faults.swapped -= 1
-            self._kept.append(text)
+            self._kept.append((send, text))
         else:
-            await self._send(topic, text)
-            if faults.doubled > 0:
-                faults.doubled -= 1
-                await self._send(topic, text)
-            await self._send_kept()  # those that were overtaken
+            await self._answer(send, text)
+            if not faults.held:
+                await self._send_kept()  # those that were overtaken
 
     async def _publish(self, name: str, message: dict[str, Any]) -> None:
         topic = self._prefix + name
         await self._send(topic, json.dumps({"op": "publish", "topic": topic, "msg": message}))
-
-    async def _send(self, topic: str, text: str) -> None:
-        from websockets.exceptions import ConnectionClosed
-
-        for client, topics in list(self._subscribed.items()):
-            if not topic or topic in topics:
-                try:
-                    await client.send(text)
-                except ConnectionClosed:
-                    self._subscribed.pop(client, None)
 
     def _orientation(self, now: float) -> dict[str, float]:
         """Return the wrist's quaternion: as it was locked, or swinging about z where the arm is limp."""

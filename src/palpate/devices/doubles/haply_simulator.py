@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.devices.doubles.service_double import HandSettings, MovedMass, ServiceDouble
-from palpate.errors import UsageError
+from palpate.devices.device_options import word
+from palpate.devices.doubles.service_double import HandSettings, MovedMass, ServiceDouble, ServiceFaults
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 __all__ = ["EVENTS", "HaplySimulator", "SimulatorFaults", "SimulatorSettings"]
 
 _BASE = np.array([0.0, -0.12, 0.15])  # m, the resting cursor as seen from the device's base
-_GRIPS = ("wireless", "wired", "both", "none")
 _LARGEST_FORCE = 1000.0  # N that is refused as a slip of units
 
 EVENTS = {
@@ -62,25 +61,18 @@ class SimulatorSettings(HandSettings):
     force_scale: float = 1.0  # factor on every force
     kind: str = "inverse3"  # type of the devices: inverse3, inverse3x, minverse, or one that nobody knows
     # those connected: wireless (buttons a, b and c), wired (one button, button), both or none
-    grip: str = "wireless"
+    grip: str = word("wireless", "wired", "both", "none")
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if any(s not in {"vector", "values"} for s in self.spellings) or self.grip not in _GRIPS:
-            raise UsageError(
-                "The simulated Haply knows no such spelling or grip.",
-                fix=f"Spellings are vector and values, grips are {', '.join(_GRIPS)}.",
-            )
+        if not set(self.spellings) <= {"vector", "values"}:
+            raise self.refusal(f"spelling={','.join(self.spellings)}", "Spellings are vector and values.")
 
 
 @dataclass
-class SimulatorFaults:
+class SimulatorFaults(ServiceFaults):
     """Faults of the service, switched while it runs."""
 
-    held: bool = False  # answers are kept back until this is false again; then all are sent
-    dropped: int = 0  # number of the next answers that are lost
-    doubled: int = 0  # number of the next answers that are sent twice
-    closing: bool = False  # the next message closes the connection
     absent: int = 0  # number of the next frames without any device; -1 for ever
     bare: bool = False  # frames without what is optional: status, velocity and echoed force
     echo: float = 1.0  # factor of the echoed force; the hand feels the force as it is
@@ -106,7 +98,7 @@ class _Device:
 
 
 class HaplySimulator(ServiceDouble):
-    """The service with devices of the given ids; its hand moves and forces lapse by the time, s, that `clock` returns.
+    """The service with devices of the given ids; forces lapse by the time, s, that `clock` returns.
 
     An `inventory` is the first frame of a service, with its devices and grips, instead of those of the settings; it is
     copied. `faults` and `grips`, the inventory's entries by family, may be changed at any time. `received` counts
@@ -120,21 +112,17 @@ class HaplySimulator(ServiceDouble):
         devices: tuple[str, ...] = ("04C2",),
         inventory: Mapping[str, Any] | None = None,
     ) -> None:
-        super().__init__("Haply")
-        self.settings, self._clock = settings or SimulatorSettings(), clock
-        self.faults = SimulatorFaults()
+        super().__init__("Haply", clock)
+        self.settings, self.faults = settings or SimulatorSettings(), SimulatorFaults()
         inventory = copy.deepcopy(dict(inventory or _inventory(self.settings, devices)))
         self.received, self.session = 0, int(inventory.pop("session_id", 1))
         self.port = self.events_port = self.legacy_port = 0
         self._devices = [_Device(entry, MovedMass(self.settings)) for entry in inventory.pop("inverse3")]
         self.grips: dict[str, list[dict[str, Any]]] = inventory
-        self._watchers: set[ServerConnection] = set()
-        self._clients: set[ServerConnection] = set()
-        self._kept: list[tuple[ServerConnection, str]] = []
 
     def force(self, device: int = 0) -> np.ndarray:
         """Return the force (3,) on the hand, N, in the service's axes, after its scale; zero once it has lapsed."""
-        lapsed = self._clock() > self.lapses_at(device)
+        lapsed = self.clock() > self.lapses_at(device)
         return np.zeros(3) if lapsed else self._devices[device].hand.force.copy()
 
     def lapses_at(self, device: int = 0) -> float:
@@ -147,20 +135,15 @@ class HaplySimulator(ServiceDouble):
             for places in (grip["state"], grip["state"].get("buttons", {})):
                 places |= {name: down for name in names if name in places}
 
-    def release(self) -> None:
-        """Send the answers that were held, in their order."""
-        self.faults.held = False
-        self._do(self._send_kept())
-
     def send_event(self, name: str, message: str = "", level: str = "", **data: Any) -> None:
         """Send an event to who watches, such as ``device-safety-triggered`` with ``safety_type="ebrake_triggered"``."""
         category = name.partition("-")[0]
         event = {"name": name, "category": category, "level": level or EVENTS.get(name, "notice")}
-        self._do(self._broadcast(json.dumps(event | {"data": data, "message": message})))
+        self._do(self._send("events", json.dumps(event | {"data": data, "message": message})))
 
     def restart(self) -> None:
         """Close all connections, as a restarted service does: a new session, and devices in another order."""
-        self._do(self._drop_clients())
+        super().restart()
         self.session += 1
         self._devices.reverse()
 
@@ -170,25 +153,9 @@ class HaplySimulator(ServiceDouble):
         self.events_port = await self._serve(self._watch, s.host, s.events, **routes)
         self.legacy_port = await self._serve(self._legacy, s.host, s.legacy, **routes)
 
-    async def _drop_clients(self) -> None:
-        for client in [*self._clients, *self._watchers]:
-            await client.close()
-
-    async def _broadcast(self, text: str) -> None:
-        for watcher in list(self._watchers):
-            await watcher.send(text)
-
-    async def _send_kept(self) -> None:
-        kept, self._kept = self._kept, []
-        for connection, text in kept:
-            await connection.send(text)
-
     async def _watch(self, connection: ServerConnection) -> None:
-        self._watchers.add(connection)
-        try:
+        with self._hears(connection, "events"):
             await connection.wait_closed()
-        finally:
-            self._watchers.discard(connection)
 
     async def _legacy(self, connection: ServerConnection) -> None:
         await connection.send(json.dumps(self._keyed()))
@@ -196,37 +163,19 @@ class HaplySimulator(ServiceDouble):
             await connection.send(json.dumps(self._keyed()))
 
     async def _simulate(self, connection: ServerConnection) -> None:
-        from websockets.exceptions import ConnectionClosed
-
-        self._clients.add(connection)
-        try:
+        with self._hears(connection, "simulation"):
             await connection.send(json.dumps(self._frame(full=True)))
             async for text in connection:
-                self.received += 1
                 if self.faults.closing:
                     self.faults.closing = False
                     break
-                await self._reply(connection, json.dumps(self._obey(json.loads(text))))
-        except ConnectionClosed:
-            pass  # a client that is gone takes nothing along
-        finally:
-            self._clients.discard(connection)
-
-    async def _reply(self, connection: ServerConnection, answer: str) -> None:
-        faults = self.faults
-        if faults.held:
-            self._kept.append((connection, answer))
-        elif faults.dropped > 0:
-            faults.dropped -= 1
-        else:
-            await connection.send(answer)
-            if faults.doubled > 0:
-                faults.doubled -= 1
-                await connection.send(answer)
+                answer = json.dumps(self._obey(json.loads(text)))
+                self.received += 1
+                await self._answer(connection.send, answer)
 
     def _obey(self, message: dict[str, Any]) -> dict[str, Any]:
         """Carry out a message and return the frame that answers it."""
-        now = self._clock()
+        now = self.clock()
         for device in self._devices:
             device.hand.advance(now)
         for entry in message.get("inverse3") or ():
@@ -270,11 +219,7 @@ class HaplySimulator(ServiceDouble):
             "cursor_velocity": _xyz(hand.velocity),
             "current_cursor_force": _xyz(faults.echo * hand.force),
         }
-        status = {
-            "calibrated": faults.calibrated,
-            "in_use": faults.in_use,
-            "power_supply": faults.powered,
-        }
+        status = {"calibrated": faults.calibrated, "in_use": faults.in_use, "power_supply": faults.powered}
         state = known["state"] | {name: now[name] for name in now.keys() & known["state"].keys()}
         entry = known | {"state": state, "status": known.get("status", {}) | status}
         if "preset" in known["config"]:

@@ -21,10 +21,7 @@ __all__ = ["DOUBLES", "c_compiler", "compile_double"]
 
 # device, as in --device: the source, and the library's name without what each system puts around it
 DOUBLES: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {
-        "forcedimension": ("force_dimension_double.c", "drd"),
-        "openhaptics": ("openhaptics_double.c", "HD"),
-    }
+    {"forcedimension": ("force_dimension_double.c", "drd"), "openhaptics": ("openhaptics_double.c", "HD")}
 )
 _COMPILERS = ("cc", "gcc", "clang")
 _LIMIT = 120.0  # s for the compiler

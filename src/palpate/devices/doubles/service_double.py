@@ -6,39 +6,48 @@ The hand is a mass on a spring whose other end moves up and down by a sine, with
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import math
 import threading
-from collections.abc import Coroutine
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from palpate.errors import PortInUseError, UsageError
+from palpate.devices.device_options import DeviceOptions, number
+from palpate.errors import PortInUseError
 
-__all__ = ["HandSettings", "MovedMass", "ServiceDouble"]
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+
+__all__ = ["HandSettings", "MovedMass", "ServiceDouble", "ServiceFaults"]
 
 _STEP = 1e-3  # s of the hand's integration
 
 
 @dataclass(frozen=True)
-class HandSettings:
+class HandSettings(DeviceOptions):
     """Settings of the hand."""
 
-    amplitude: float = 0.03  # m, of the stroke, downwards first
-    frequency: float = 0.5  # Hz
-    mass: float = 0.3  # kg
+    driver = "the simulated hand"
+
+    amplitude: float = number(0.03, -0.1, 0.1)  # m, of the stroke, downwards first
+    frequency: float = number(0.5)  # Hz
+    mass: float = number(0.3, 0.0, above=True)  # kg
     damping: float = 5.0  # N·s/m
     stiffness: float = 300.0  # N/m
-    silence: float = 0.1  # s without a command after which the force on it lapses
+    silence: float = number(0.1, 0.0, above=True)  # s without a command after which the force on it lapses
 
-    def __post_init__(self) -> None:
-        if not (self.mass > 0.0 and self.silence > 0.0 and abs(self.amplitude) <= 0.1):
-            raise UsageError(
-                "No hand can be simulated with these settings.",
-                fix="Mass and silence are positive; a stroke is 0.1 m at most.",
-            )
+
+@dataclass
+class ServiceFaults:
+    """Faults of a service, switched while it runs."""
+
+    held: bool = False  # answers are kept back until `ServiceDouble.release`; then all are sent
+    dropped: int = 0  # number of the next answers that are lost
+    doubled: int = 0  # number of the next answers that are sent twice
+    closing: bool = False  # the next message closes the connection
 
 
 class MovedMass:
@@ -72,10 +81,18 @@ class MovedMass:
 
 
 class ServiceDouble:
-    """A service on a thread of its own; a context manager. Its kinds open their ports in `_listen`."""
+    """A service on a thread of its own; a context manager. Its kinds open their ports in `_listen`.
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    Its hand moves, and what it sends is stamped, by the time, s, that `clock` returns. Each of its clients hears the
+    topics that it has asked for. `faults` may be changed at any time.
+    """
+
+    faults: ServiceFaults
+
+    def __init__(self, name: str, clock: Callable[[], float]) -> None:
+        self._name, self.clock = name, clock
+        self._clients: dict[ServerConnection, set[str]] = {}
+        self._kept: list[tuple[Callable[[str], Awaitable[None]], str]] = []
         self._loop = asyncio.new_event_loop()
         self._servers: list[Any] = []
 
@@ -103,12 +120,19 @@ class ServiceDouble:
         self._thread.join()
         self._loop.close()
 
+    def release(self) -> None:
+        """Send the answers that were held, in their order."""
+        self.faults.held = False
+        self._do(self._send_kept())
+
+    def restart(self) -> None:
+        """Close all connections, as a restarted service does."""
+        self._do(self._drop_clients())
+
     def __enter__(self) -> Self:
         return self.start()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def _do(self, work: Coroutine[Any, Any, None]) -> None:
@@ -124,6 +148,51 @@ class ServiceDouble:
         server = await serve(handler, host, port, **plain, **settings)
         self._servers.append(server)
         return int(next(iter(server.sockets)).getsockname()[1])
+
+    @contextlib.contextmanager
+    def _hears(self, client: ServerConnection, *topics: str) -> Iterator[set[str]]:
+        """Have a client, which hears these topics, until it is gone: it takes nothing along."""
+        from websockets.exceptions import ConnectionClosed
+
+        heard = self._clients[client] = set(topics)
+        try:
+            with contextlib.suppress(ConnectionClosed):
+                yield heard
+        finally:
+            self._clients.pop(client, None)
+
+    async def _send(self, topic: str, text: str) -> None:
+        """Send a text to all clients that hear a topic; an empty one is heard by all."""
+        from websockets.exceptions import ConnectionClosed
+
+        for client, topics in list(self._clients.items()):
+            if not topic or topic in topics:
+                try:
+                    await client.send(text)
+                except ConnectionClosed:
+                    self._clients.pop(client, None)
+
+    async def _answer(self, send: Callable[[str], Awaitable[None]], text: str) -> None:
+        """Send an answer as the faults have it."""
+        faults = self.faults
+        if faults.held:
+            self._kept.append((send, text))
+        elif faults.dropped > 0:
+            faults.dropped -= 1
+        else:
+            await send(text)
+            if faults.doubled > 0:
+                faults.doubled -= 1
+                await send(text)
+
+    async def _send_kept(self) -> None:
+        kept, self._kept = self._kept, []
+        for send, text in kept:
+            await send(text)
+
+    async def _drop_clients(self) -> None:
+        for client in list(self._clients):
+            await client.close()
 
     async def _listen(self) -> None:
         raise NotImplementedError

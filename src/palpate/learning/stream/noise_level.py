@@ -10,7 +10,8 @@ innovation is made of noise rather than of what is not known of the map, and as 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from palpate.kernels import kernel
 
 __all__ = ["NoiseLevel"]
 
@@ -57,7 +58,7 @@ class NoiseLevel:
         self.mean += 0.01 * share * (square - self.mean)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _level(log: np.ndarray, x: np.ndarray) -> float:
     """r by the regression at x (n,)."""
     value = log[0]
@@ -66,7 +67,7 @@ def _level(log: np.ndarray, x: np.ndarray) -> float:
     return float(np.exp(min(max(value, -60.0), 60.0)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _correction(near: np.ndarray, phi: np.ndarray) -> float:
     """c, by what was read near the units."""
     total, seen, squares = 0.0, 0.0, 0.0
@@ -80,7 +81,7 @@ def _correction(near: np.ndarray, phi: np.ndarray) -> float:
     return (squares / total + _LOCAL) / (seen / total + _LOCAL)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(allocates=True)
 def _learn(
     log: np.ndarray,
     information: np.ndarray,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from palpate.kernels import kernel
 
 __all__ = ["measure", "mix"]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(allocates=True)
 def mix(
     transitions: np.ndarray,
     chances: np.ndarray,
@@ -51,7 +52,7 @@ def mix(
     return ahead, mixed, P
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(allocates=True)
 def measure(
     row: np.ndarray,
     rest: float,

@@ -15,7 +15,8 @@ from palpate.physics.advice import advise_on_modulus
 from palpate.physics.beam.beam_loads import Load, LoadAndUnload, StepAndHold, as_loads
 from palpate.physics.beam.beam_problem import BeamProblem
 from palpate.physics.beam.cross_section import CrossSection
-from palpate.physics.beam.section_laws import BeamMaterial, Kind, material_kind
+from palpate.physics.beam.section_laws import Kind, material_kind
+from palpate.physics.materials.material import Material
 
 __all__ = ["Cantilever"]
 
@@ -64,7 +65,7 @@ class Cantilever:
 
     length: float
     section: CrossSection
-    material: BeamMaterial
+    material: Material
     elements: int = 20
     order: int = 3
     kinematics: Kinematics = "large"

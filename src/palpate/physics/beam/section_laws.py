@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from palpate.physics.beam.cantilever import Cantilever
 
 __all__ = [
-    "BeamMaterial",
     "ElasticSection",
     "Kind",
     "PlasticSection",
@@ -50,33 +49,6 @@ __all__ = [
 
 Kind = Literal["elastic", "plastic", "viscous"]
 SHORT = 1e-3  # steps below this share of a relaxation time: the overstress changes as good as evenly
-
-
-class BeamMaterial(Protocol):
-    """The constants that a beam reads off its material.
-
-    A material that yields has a `hardening` too, one that creeps a `prony`.
-    """
-
-    @property
-    def name(self) -> str:
-        """Name for messages and reports."""
-
-    @property
-    def young(self) -> float:
-        """Young's modulus in Pa, the instantaneous one."""
-
-    @property
-    def poisson(self) -> float:
-        """Poisson's ratio."""
-
-    @property
-    def shear_modulus(self) -> float:
-        """G in Pa, the instantaneous one."""
-
-    @property
-    def density(self) -> float:
-        """Mass per volume in kg/m³."""
 
 
 class SectionAnswer(NamedTuple):

@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from palpate.physics.interactions.interaction import BEYOND, Field
-from palpate.physics.interactions.surface_patch import Patch, winding_number
+from palpate.physics.interactions.surface_patch import Patch
 from palpate.physics.shapes.mesh import BodyMesh
+from palpate.physics.shapes.surface_checks import winding_number
 from palpate.physics.stop import Stop, Verdict
 
 __all__ = ["REACH", "Contact", "pad_energy", "pressed_energy"]
@@ -154,4 +155,4 @@ class Contact:
 
     def _inside(self, centre: np.ndarray) -> bool:
         points = self.mesh.points + self.field.at_nodes()
-        return winding_number(points, self.mesh.triangles, centre) > 0.5
+        return winding_number(points[self.mesh.triangles], centre) > 0.5

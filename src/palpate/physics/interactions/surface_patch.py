@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from palpate.physics.shapes.meshing import FineMesh
     from palpate.physics.shapes.shape import Geometry
 
-__all__ = ["Patch", "cross", "surface_of", "winding_number"]
+__all__ = ["Patch", "cross", "surface_of"]
 
 
 PLANE = 1e-9  # by how much the mean normal of a plane surface may fall short of one
@@ -125,20 +125,6 @@ class Patch:
         root = np.sqrt(rest)
         weights = np.stack([1 - root, root * (1 - unit[:, 1]), root * unit[:, 1]], axis=1)
         return np.asarray(np.einsum("nk,nki->ni", weights, self.corners[chosen]))
-
-
-def winding_number(points: np.ndarray, triangles: np.ndarray, place: np.ndarray) -> float:
-    """Return the number of times a closed surface winds around a place (3,) in m: 1 inside, 0 outside.
-
-    The triangles (t, 3) of nodes (node, 3) in m are counter-clockwise as seen from outside. The number follows from
-    their solid angles (Van Oosterom & Strackee 1983).
-    """
-    a, b, c = np.moveaxis(points[triangles] - place, 1, 0)
-    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-    above = np.einsum("ti,ti->t", a, np.cross(b, c))
-    dots = [np.einsum("ti,ti->t", v, w) for v, w in ((a, b), (b, c), (c, a))]
-    below = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
-    return float(2 * np.arctan2(above, below).sum() / (4 * np.pi))
 
 
 def _barycentric(a: np.ndarray, b: np.ndarray, c: np.ndarray, place: np.ndarray) -> np.ndarray:

@@ -99,9 +99,8 @@ def fit(
             fix='Pass StretchTest("uniaxial", stretch, stress, "nominal"), or a list of such.',
         )
     if any(isinstance(t, IndentationTest) for t in records):
-        from palpate.physics.solid.fit_indentation import (
-            fit_indentation,  # it solves solids, made of materials
-        )
+        # it solves solids, which are made of materials
+        from palpate.physics.solid.fit_indentation import fit_indentation
 
         return fit_indentation(law, records, poisson, confidence)
     if not -1 < poisson <= 0.5:
@@ -201,9 +200,8 @@ class _Problem:
         if form.origin is not None:
             found = self._search(form, form.origin, measured)
             return None if found is None else self._solved(form, found, measured)
-        bends = (
-            self.poisson < 0.5
-        )  # stresses are not linear in the moduli; the incompressible law is a first guess
+        # stresses of a compressible law are not linear in the moduli: the incompressible one is a first guess
+        is_compressible = self.poisson < 0.5
         first = replace(self, poisson=0.5)
         best: tuple[float, np.ndarray, tuple[float, ...]] | None = None
         for start in form.starts:
@@ -211,14 +209,14 @@ class _Problem:
             x, residual = first._moduli(form, exponents, measured, stable=stable)
             if not _is_material(form, x, self.poisson):
                 continue
-            residual = self._residuals(form, x, measured) if bends else residual
+            residual = self._residuals(form, x, measured) if is_compressible else residual
             cost = float(residual @ residual)
             if np.abs(residual).max() < _REFUSED and (best is None or cost < best[0]):
                 best = cost, x, start
         if best is None:
             return None
         _, x, start = best
-        x = self._refine(form, x, start, measured, stable=stable) if bends else x
+        x = self._refine(form, x, start, measured, stable=stable) if is_compressible else x
         return self._solved(form, x, measured)
 
     def _search(self, form: LawForm, origin: np.ndarray, measured: np.ndarray) -> np.ndarray | None:

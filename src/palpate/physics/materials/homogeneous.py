@@ -26,6 +26,7 @@ from palpate.physics.materials.tensors import (
 
 __all__ = [
     "Response",
+    "diagonal",
     "energy_of",
     "equibiaxial",
     "is_incompressible",
@@ -33,6 +34,7 @@ __all__ = [
     "relax_free",
     "simple_shear",
     "uniaxial",
+    "unit_tensors",
     "volumetric",
 ]
 
@@ -118,30 +120,14 @@ def _volume(F: np.ndarray, small: bool) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """States of one kind of test.
+    """States of one kind of test: stresses and energies per undeformed area and volume, NaN without an equilibrium."""
 
-    Attributes
-    ----------
-    amount : ndarray (n,)
-        Prescribed amounts: stretches, or shear strains, or volume ratios.
-    deformation : ndarray (n, 3, 3)
-        Deformation gradients F.
-    nominal : ndarray (n, 3, 3)
-        First Piola–Kirchhoff stresses ∂W/∂F in Pa: force per undeformed area.
-    energy : ndarray (n,)
-        Densities per undeformed volume, in J/m³.
-    converged : ndarray of bool (n,)
-        True where the free directions reached a stress-free state; the rest is NaN elsewhere.
-    stress : ndarray (n,)
-        The nominal stress of the test in Pa: along the first axis, of the shear, or the mean one.
-    """
-
-    amount: np.ndarray
-    deformation: np.ndarray
-    nominal: np.ndarray
-    energy: np.ndarray
-    converged: np.ndarray
-    stress: np.ndarray
+    amount: np.ndarray  # (n,) prescribed stretches, shear strains or volume ratios
+    deformation: np.ndarray  # (n, 3, 3) deformation gradients F
+    nominal: np.ndarray  # (n, 3, 3) first Piola–Kirchhoff stresses ∂W/∂F in Pa
+    energy: np.ndarray  # (n,) J/m³
+    converged: np.ndarray  # (n,) bool, whether the free directions reached a stress-free state
+    stress: np.ndarray  # (n,) Pa, of the test: along the first axis, of the shear, or the mean one
 
     @property
     def cauchy(self) -> np.ndarray:
@@ -154,76 +140,40 @@ class Response:
 def uniaxial(
     material: Material, stretch: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """Tension (stretch > 1) or compression along the first axis, the sides free.
+    """Return tension (stretch > 1) or compression along the first axis, the sides free.
 
-    Parameters
-    ----------
-    material : Material
-        Any, also an incompressible one.
-    stretch : array_like (n,)
-        λ = length over undeformed length, positive.
-    state, dt : optional
-        Internal variables at the beginning of the step (n, …), by default the undeformed body's, and its length in s,
-        for materials with a history.
-
-    Raises
-    ------
-    UsageError
-        For stretches that are not positive and finite.
+    `stretch` (n,) is length over undeformed length. `state` holds the internal variables at the beginning of the step
+    (n, …), by default the undeformed body's, `dt` is its length in s, for materials with a history.
     """
     loaded = _amounts(stretch, "stretch")
-    F = _unit(loaded)
-    F[:, 0, 0] = loaded
-    F[:, 1, 1] = F[:, 2, 2] = _side(material, loaded, 1)
-    return _test(material, loaded, F, _LATERAL, (0, 0), state, dt)
+    side = _side(material, loaded, 1)
+    return _test(material, loaded, diagonal(loaded, side, side), _LATERAL, (0, 0), state, dt)
 
 
 def equibiaxial(
     material: Material, stretch: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """Stretch λ along the first two axes alike, the third free; arguments as of `uniaxial`.
-
-    Raises
-    ------
-    UsageError
-        For stretches that are not positive and finite.
-    """
+    """Return the stretch λ along the first two axes alike, the third free; arguments as of `uniaxial`."""
     loaded = _amounts(stretch, "stretch")
-    F = _unit(loaded)
-    F[:, 0, 0] = F[:, 1, 1] = loaded
-    F[:, 2, 2] = _side(material, loaded, 2)
+    F = diagonal(loaded, loaded, _side(material, loaded, 2))
     return _test(material, loaded, F, _PLANE, (0, 0), state, dt)
 
 
 def planar(
     material: Material, stretch: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """Stretch λ along the first axis, none along the second, the third free ("pure shear"); arguments as of `uniaxial`.
-
-    Raises
-    ------
-    UsageError
-        For stretches that are not positive and finite.
-    """
+    """Return the stretch λ along the first axis, none along the second, the third free ("pure shear")."""
     loaded = _amounts(stretch, "stretch")
-    F = _unit(loaded)
-    F[:, 0, 0] = loaded
-    F[:, 2, 2] = np.sqrt(_side(material, loaded, 2))
+    F = diagonal(loaded, np.ones_like(loaded), np.sqrt(_side(material, loaded, 2)))
     return _test(material, loaded, F, _PLANE, (0, 0), state, dt)
 
 
 def simple_shear(
     material: Material, shear: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """F = I + γ e₁ ⊗ e₂ for shear strains γ (n,); `state` and `dt` as of `uniaxial`.
-
-    Raises
-    ------
-    UsageError
-        For strains that are not finite.
-    """
+    """Return F = I + γ e₁ ⊗ e₂ for shear strains γ (n,); `state` and `dt` as of `uniaxial`."""
     loaded = _amounts(shear, "shear strain", positive=False)
-    F = _unit(loaded)
+    F = unit_tensors(len(loaded))
     F[:, 0, 1] = loaded
     return _test(material, loaded, F, (), (0, 1), state, dt)
 
@@ -231,13 +181,7 @@ def simple_shear(
 def volumetric(
     material: Material, ratio: ArrayLike, *, state: Mapping[str, Any] = NO_STATE, dt: Any = None
 ) -> Response:
-    """F = J^(1/3) I for volume ratios J (n,); `state` and `dt` as of `uniaxial`.
-
-    Raises
-    ------
-    UsageError
-        For ratios that are not positive and finite, or an incompressible material.
-    """
+    """Return F = J^(1/3) I for volume ratios J (n,) of a compressible material; `state` and `dt` as of `uniaxial`."""
     loaded = _amounts(ratio, "volume ratio")
     if is_incompressible(material):
         raise incompressible(material.name)
@@ -312,8 +256,16 @@ def _amounts(values: ArrayLike, what: str, *, positive: bool = True) -> np.ndarr
     return amounts
 
 
-def _unit(amounts: np.ndarray) -> np.ndarray:
-    return np.tile(np.eye(3), (len(amounts), 1, 1))
+def unit_tensors(count: int) -> np.ndarray:
+    """Return unit tensors (count, 3, 3)."""
+    return np.tile(np.eye(3), (count, 1, 1))
+
+
+def diagonal(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Return the deformation gradients (n, 3, 3) of stretches (n,) along the axes."""
+    F = np.zeros((len(x), 3, 3), dtype=x.dtype)
+    F[:, range(3), range(3)] = np.stack([x, y, z], axis=-1)
+    return F
 
 
 def _side(material: Material, stretch: np.ndarray, loaded: int) -> np.ndarray:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.physics.materials.homogeneous import equibiaxial, is_incompressible, planar, uniaxial
+from palpate.physics.materials.homogeneous import diagonal, equibiaxial, is_incompressible, planar, uniaxial
 from palpate.physics.materials.material import Material
 from palpate.physics.materials.mooney_rivlin import MooneyRivlin
 from palpate.physics.materials.neo_hooke import NeoHookean
@@ -35,36 +35,19 @@ _LEAST_EXPONENT, _LARGEST_EXPONENT = 0.05, 40.0
 class LawForm:
     """A law whose constants are open.
 
-    Attributes
-    ----------
-    name : str
-        Name, such as ``"ogden-3"``.
-    constants : tuple of (str, str)
-        Name and SI unit of each constant, in the order of `values`.
-    build : callable
-        Function of coordinates (n,) and Poisson's ratio that returns the material.
-    values : callable
-        Function of coordinates (n,) that returns the constants (n,).
-    moduli : int
-        Number of coordinates that are moduli; the others are exponents.
-    starts : tuple of tuples
-        Exponents from which searches begin; one empty tuple for a law without exponents.
-    signed : bool
-        True where negative moduli can make a stable law, so that they are tried first.
-    origin : (n,) array or None
-        Coordinates from which the search begins, for a law of the user's.
-    keys : callable
-        Function of the constants (n,) that returns them as keys of a material in a study file.
+    `build` makes the material of coordinates (n,) and Poisson's ratio, `values` the constants (n,) of coordinates,
+    `keys` the keys of a material in a study file of constants. `starts` are the exponents from which searches begin,
+    one empty tuple for a law without.
     """
 
-    name: str
-    constants: tuple[tuple[str, str], ...]
+    name: str  # such as "ogden-3"
+    constants: tuple[tuple[str, str], ...]  # name and SI unit of each, in the order of `values`
     build: Callable[[np.ndarray, float], Any]
     values: Callable[[np.ndarray], np.ndarray]
-    moduli: int
+    moduli: int  # number of coordinates that are moduli; the others are exponents
     starts: tuple[tuple[float, ...], ...] = ((),)
-    signed: bool = False
-    origin: np.ndarray | None = None
+    signed: bool = False  # whether negative moduli can make a stable law: they are tried first
+    origin: np.ndarray | None = None  # (n,) coordinates from which the search for a user's law begins
     keys: Callable[[np.ndarray], dict[str, Any]] | None = None
 
     @staticmethod
@@ -156,13 +139,7 @@ CANDIDATES = tuple(FORMS)
 
 
 def form_of(law: Any) -> LawForm:
-    """Return the form of a name, of one of the classes of laws, or of a user's material with constants.
-
-    Raises
-    ------
-    UsageError
-        If there is none.
-    """
+    """Return the form of a name, of one of the classes of laws, or of a user's material with constants."""
     classes = {NeoHookean: "neo-hookean", MooneyRivlin: "mooney-rivlin", Yeoh: "yeoh", Ogden: "ogden"}
     if isinstance(law, UserMaterial):
         return _user_form(law)
@@ -199,19 +176,11 @@ def _user_form(law: UserMaterial) -> LawForm:
 
 
 def stress_in_test(material: Material, test: StretchTest, stretch: np.ndarray | None = None) -> np.ndarray:
-    """Return the stress (N,) in Pa that a material has in a test, in the test's measure.
+    """Return the stress (N,) in Pa that an elastic material has in a test, in the test's measure.
 
     An incompressible isotropic material's deformation is known beforehand, and its nominal stress is the slope of its
-    energy along it, by a complex step; of other materials the free directions are found first.
-
-    Parameters
-    ----------
-    material : Material
-        Any elastic material.
-    test : StretchTest
-        Gives mode and measure.
-    stretch : (N,) array, optional
-        Stretches; by default those of the test.
+    energy along it, by a complex step; of other materials the free directions are found first. `stretch` (N,) is that
+    of the test by default.
     """
     stretch = test.stretch if stretch is None else stretch
     if is_incompressible(material) and not isinstance(material, UserMaterial):
@@ -227,12 +196,8 @@ def stress_in_test(material: Material, test: StretchTest, stretch: np.ndarray | 
 
 def _incompressible(mode: str, stretch: np.ndarray) -> np.ndarray:
     """Return F (N, 3, 3) of a test at constant volume."""
-    others = {
-        "uniaxial": (stretch**-0.5, stretch**-0.5),
-        "equibiaxial": (stretch, stretch**-2),
-        "planar": (np.ones_like(stretch), 1 / stretch),
-    }[mode]
-    F = np.zeros((len(stretch), 3, 3), dtype=stretch.dtype)
-    for axis, values in enumerate((stretch, *others)):
-        F[:, axis, axis] = values
-    return F
+    if mode == "uniaxial":
+        return diagonal(stretch, stretch**-0.5, stretch**-0.5)
+    if mode == "equibiaxial":
+        return diagonal(stretch, stretch, stretch**-2)
+    return diagonal(stretch, np.ones_like(stretch), 1 / stretch)

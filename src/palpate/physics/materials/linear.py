@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from palpate.physics.materials.material import NO_STATE, Volumetric, YoungAndPoisson, small_volume
-from palpate.physics.materials.moduli import require_moduli
 from palpate.physics.materials.tensors import Scalar, Tensor, deviator, identity, inner, sym
 
 __all__ = ["LinearElastic"]
@@ -44,9 +43,6 @@ class LinearElastic(YoungAndPoisson):
 
     law: ClassVar[str] = "linear elastic"
     kinematics: ClassVar[Literal["large", "small"]] = "small"
-
-    def __post_init__(self) -> None:
-        require_moduli(self.young, self.poisson, self.density)
 
     @property
     def volumetric(self) -> Volumetric:

@@ -58,17 +58,8 @@ def load_runs(deformation: np.ndarray) -> list[Run]:
 def rows_of_cycle(deformation: np.ndarray, choice: str | None) -> tuple[np.ndarray, str]:
     """Return the indices of the rows of a cycle, and a sentence where a record has more than one loading.
 
-    Parameters
-    ----------
-    deformation : (N,) array
-        Strain, λ − 1, or depth; 0 at rest.
-    choice : str, optional
-        "first", "last", a number or "all"; "2 unloading" for the way back. By default the first loading.
-
-    Raises
-    ------
-    UsageError
-        If the choice can't be read, or the record has no such cycle.
+    `deformation` (N,) is a strain, λ − 1, or a depth; 0 at rest. `choice` is "first", "last", a number or "all", "2
+    unloading" for the way back; by default the first loading.
     """
     match = _CHOICE.fullmatch((choice or "first").strip().lower())
     if match is None:

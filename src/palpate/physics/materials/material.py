@@ -18,6 +18,8 @@ from palpate.physics.materials.moduli import (
     lame_modulus,
     poisson_ratio,
     require_density,
+    require_moduli,
+    require_numbers,
     require_poisson,
     shear_from_young,
     young_modulus,
@@ -255,6 +257,9 @@ class Elastic:
 class YoungAndPoisson(Elastic):
     """Base of the laws whose constants are Young's modulus E and Poisson's ratio ν, fields `young` and `poisson`."""
 
+    def __post_init__(self) -> None:
+        require_moduli(self.young, self.poisson, self.density)
+
     @property
     def shear_modulus(self) -> float:
         """μ = E/(2(1 + ν)) in Pa."""
@@ -286,9 +291,23 @@ class ShearAndBulk(Elastic):
 
 
 class Isochoric(ShearAndBulk):
-    """Base of the laws of C̄ = J^(−2/3) FᵀF, with ½ K (J − 1)² for the volume and K their field `bulk`."""
+    """Base of the laws of C̄ = J^(−2/3) FᵀF, with ½ K (J − 1)² for the volume and K their field `bulk`.
+
+    The fields before `bulk` are the law's own constants, in Pa.
+    """
 
     bulk: float
+
+    def __post_init__(self) -> None:
+        self._require_constants()
+        checks.positive(f"The bulk modulus of {self.name}", self.bulk, "Pa", infinite=True)
+        checks.positive(f"The initial shear modulus of {self.name}", self.shear_modulus, "Pa")
+        require_density(self.density)
+
+    def _require_constants(self) -> None:
+        names = [f.name for f in dataclasses.fields(self)]  # type: ignore[arg-type]  # a law is a dataclass
+        constants = [getattr(self, name) for name in names[: names.index("bulk")]]
+        require_numbers(f"A constant of {self.name}", constants, "Pa")
 
     @classmethod
     def with_poisson(cls, poisson: float, **constants: Any) -> Self:
@@ -320,11 +339,6 @@ class Isochoric(ShearAndBulk):
     def volumetric(self) -> Volumetric:
         """½ K (J − 1)²."""
         return Volumetric(self.bulk, volume_change)
-
-    def _check(self) -> None:
-        checks.positive(f"The bulk modulus of {self.name}", self.bulk, "Pa", infinite=True)
-        checks.positive(f"The initial shear modulus of {self.name}", self.shear_modulus, "Pa")
-        require_density(self.density)
 
 
 class MadeFrom(Elastic):

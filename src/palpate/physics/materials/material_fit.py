@@ -26,25 +26,13 @@ _MARKS = {"uniaxial": "o", "equibiaxial": "s", "planar": "^"}
 
 @dataclass(frozen=True)
 class Constant:
-    """A fitted constant.
+    """A fitted constant."""
 
-    Attributes
-    ----------
-    name : str
-        Name in the law.
-    value : float
-        Value in `unit`.
-    low, high : float
-        Ends of its interval.
-    unit : str
-        SI unit; "" of a pure number, or of a user's constant.
-    """
-
-    name: str
-    value: float
-    low: float
+    name: str  # in the law
+    value: float  # in `unit`
+    low: float  # the interval's ends
     high: float
-    unit: str = ""
+    unit: str = ""  # SI; empty of a pure number, or of a user's constant
 
     def __str__(self) -> str:
         """Return name, value, interval and unit."""
@@ -53,27 +41,13 @@ class Constant:
 
 @dataclass(frozen=True)
 class Rival:
-    """One of the laws among which a fit chose.
+    """One of the laws among which a fit chose."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the law.
-    error : float
-        Root mean square of its residuals over their scale.
-    score : float
-        Akaike's criterion for few rows; less is better.
-    verdict : str
-        Verdict on its stability, in words.
-    is_stable : bool
-        True if it stays stable over the range asked.
-    """
-
-    name: str
-    error: float
-    score: float
-    verdict: str
-    is_stable: bool
+    name: str  # of the law
+    error: float  # root mean square of its residuals over their scale
+    score: float  # Akaike's criterion for few rows; less is better
+    verdict: str  # on its stability, in words
+    is_stable: bool  # over the range asked
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ from palpate.physics.materials.homogeneous import (
     planar,
     simple_shear,
     uniaxial,
+    unit_tensors,
     volumetric,
 )
 from palpate.physics.materials.material import NO_STATE, Material, initial_state
@@ -138,20 +139,8 @@ def stability(
 ) -> Stability:
     """Test a material over ranges of strain; a material with a history, in its first step of `dt` seconds.
 
-    Parameters
-    ----------
-    material : Material
-        Any.
-    strain : tuple of float, or mapping of mode to it
-        Range of λ − 1 in uniaxial, equibiaxial and planar tests, and of γ in simple shear; from above −1. A mapping
-        gives each of these four modes a range of its own.
-    volume : tuple of float
-        Range of J − 1.
-
-    Raises
-    ------
-    UsageError
-        If a range is empty, does not hold 0, or begins at −1 or below.
+    `strain` is the range of λ − 1 in uniaxial, equibiaxial and planar tests, and of γ in simple shear, from above −1; a
+    mapping gives each of these four modes a range of its own. `volume` is the range of J − 1. Each holds 0.
     """
     ranges = strain if isinstance(strain, Mapping) else {mode: strain for mode, _, _ in _MODES}
     ranges = {**ranges, "volumetric": volume}
@@ -162,7 +151,7 @@ def stability(
         if mode == "volumetric" and is_incompressible(material):
             continue
         strains = _spaced(ranges[mode])
-        state = initial_state(material, _unit(strains)) if material.states else NO_STATE
+        state = initial_state(material, unit_tensors(len(strains))) if material.states else NO_STATE
         moduli = _least_moduli(material, test(material, undeformed + strains, state=state, dt=dt), state, dt)
         verdicts.append(_verdict(mode, strains, moduli))
     return Stability(material.name, tuple(verdicts))
@@ -175,9 +164,8 @@ def _least_moduli(material: Material, response: Response, state: Any, dt: Any) -
     F = np.where(converged[:, None, None], response.deformation, np.eye(3))
     P = gradient(energy, F)
     H = _symmetric_basis()
-    if is_incompressible(
-        material
-    ):  # rates of strain that keep the volume, on which the pressure does no work
+    if is_incompressible(material):
+        # rates of strain that keep the volume, on which the pressure does no work
         H = np.concatenate([np.einsum("ab,bij->aij", _TRACELESS, H[:3]), H[3:]])
     small = material.kinematics == "small"
     moved = np.broadcast_to(H, (len(F), *H.shape)) if small else np.einsum("aij,njk->naik", H, F)
@@ -217,10 +205,6 @@ def _symmetric_basis() -> np.ndarray:
 def _spaced(limits: tuple[float, float]) -> np.ndarray:
     """Return evenly spaced strains with 0 among them."""
     return np.unique(np.append(np.linspace(*limits, _STATES), 0.0))
-
-
-def _unit(strains: np.ndarray) -> np.ndarray:
-    return np.tile(np.eye(3), (len(strains), 1, 1))
 
 
 def _check(limits: tuple[float, float]) -> None:

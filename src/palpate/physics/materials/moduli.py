@@ -54,26 +54,14 @@ def poisson_ratio(shear: float, bulk: float) -> float:
 
 
 def require_moduli(young: float, poisson: float, density: float) -> None:
-    """Refuse a Young's modulus, Poisson's ratio and density that no stable material has.
-
-    Raises
-    ------
-    UsageError
-        Unless E > 0, −1 < ν ≤ 0.5 and ρ ≥ 0, all finite.
-    """
+    """Refuse moduli and a density that no stable material has: unless E > 0, −1 < ν ≤ 0.5 and ρ ≥ 0, all finite."""
     checks.positive("Young's modulus", young, "Pa")
     require_poisson(poisson)
     require_density(density)
 
 
 def require_poisson(poisson: float) -> None:
-    """Refuse a Poisson's ratio that no stable material has.
-
-    Raises
-    ------
-    UsageError
-        Unless −1 < ν ≤ 0.5.
-    """
+    """Refuse a Poisson's ratio that no stable material has: unless −1 < ν ≤ 0.5."""
     checks.finite("Poisson's ratio", poisson)
     if not -1 < poisson <= 0.5:
         raise unphysical("Poisson's ratio", poisson, "above -1 and at most 0.5")
@@ -85,13 +73,7 @@ def require_density(density: float) -> None:
 
 
 def require_numbers(what: str, values: float | Sequence[float], unit: str = "") -> tuple[float, ...]:
-    """A tuple of finite numbers from a number or a sequence of numbers.
-
-    Raises
-    ------
-    UsageError
-        If it is empty or holds anything else.
-    """
+    """Return a tuple of finite numbers of a number or a sequence of numbers that is not empty."""
     numbers = tuple(values) if isinstance(values, Sequence) else (values,)
     if not numbers:
         raise UsageError(

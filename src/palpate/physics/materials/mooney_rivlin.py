@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from palpate.physics.materials.material import NO_STATE, Isochoric
-from palpate.physics.materials.moduli import require_numbers
 from palpate.physics.materials.tensors import Scalar, Tensor, isochoric_first, isochoric_second
 
 __all__ = ["MooneyRivlin"]
@@ -45,10 +44,6 @@ class MooneyRivlin(Isochoric):
     source: str = ""
 
     law: ClassVar[str] = "Mooney–Rivlin"
-
-    def __post_init__(self) -> None:
-        require_numbers(f"A constant of {self.name}", (self.c10, self.c01), "Pa")
-        self._check()
 
     @property
     def shear_modulus(self) -> float:

@@ -61,7 +61,7 @@ class NeoHookean(YoungAndPoisson):
     law: ClassVar[str] = "neo-Hookean"
 
     def __post_init__(self) -> None:
-        require_moduli(self.young, self.poisson, self.density)
+        super().__post_init__()
         if self.form not in {"coupled", "isochoric"}:
             raise UsageError(
                 f"A neo-Hookean law has no form {self.form!r}.",

@@ -50,7 +50,7 @@ class Ogden(Isochoric):
 
     law: ClassVar[str] = "Ogden"
 
-    def __post_init__(self) -> None:
+    def _require_constants(self) -> None:
         object.__setattr__(self, "mu", require_numbers(f"A constant μ of {self.name}", self.mu, "Pa"))
         object.__setattr__(self, "alpha", require_numbers(f"An exponent α of {self.name}", self.alpha))
         if len(self._mu) != len(self._alpha) or 0.0 in self._alpha:
@@ -59,7 +59,6 @@ class Ogden(Isochoric):
                 why="Each term has one μ in Pa and one α, a number other than zero.",
                 fix="Pass two tuples of equal length, such as mu=(630.0, 1.2), alpha=(1.3, 5.0).",
             )
-        self._check()
 
     @property
     def _mu(self) -> tuple[float, ...]:

@@ -145,16 +145,10 @@ def spring_energy(overstress: Tensor, shear: float, bulk: float) -> Scalar:
 
 
 def dashpot_loss(overstress: Tensor, growth: Tensor, ratio: float, shear: float, bulk: float) -> Scalar:
-    """Heat in J/m³ of one term over a step.
+    """Return the heat in J/m³ of one term over a step, whose length over the relaxation time is `ratio`.
 
-    Parameters
-    ----------
-    overstress, growth : (..., 3, 3)
-        H at the beginning of the step and J, the growth of the term's share of the instantaneous stress, in Pa.
-    ratio : float
-        Step over relaxation time.
-    shear, bulk : float
-        The spring's moduli in Pa.
+    `overstress` and `growth` (..., 3, 3) are H at the beginning of the step and J, the growth of the term's share of
+    the instantaneous stress, in Pa; `shear` and `bulk` are the spring's moduli in Pa.
     """
     decay = -math.expm1(-ratio)
     own = _form(overstress, overstress, shear, bulk) * -math.expm1(-2 * ratio)

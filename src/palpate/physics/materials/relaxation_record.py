@@ -30,24 +30,12 @@ _CLOCK = 20  # samples that would fit before the first one: a record does not st
 
 @dataclass(frozen=True, eq=False)
 class HeldRecord:
-    """The rows of a hold.
+    """The rows of a hold."""
 
-    Attributes
-    ----------
-    time : (N,) array
-        Time from the begin of the hold, s.
-    response : (N,) array
-        Response without the preload, in the record's unit.
-    ramp : float
-        Time of the rise, s; 0 where nothing tells it.
-    notes : tuple of str
-        Sentences on what was found in the record.
-    """
-
-    time: np.ndarray
-    response: np.ndarray
-    ramp: float
-    notes: tuple[str, ...]
+    time: np.ndarray  # (N,) from the begin of the hold, s
+    response: np.ndarray  # (N,) without the preload, in the record's unit
+    ramp: float  # time of the rise, s; 0 where nothing tells it
+    notes: tuple[str, ...]  # what was found in the record
 
 
 def held_record(
@@ -55,21 +43,9 @@ def held_record(
 ) -> HeldRecord:
     """Return the hold of a record, with what is not given found in it.
 
-    Parameters
-    ----------
-    time, response : (N,) arrays
-        Time in s on any clock, in order, and stress or force.
-    begin : float, optional
-        Time at which the hold begins, s. By default the end of the rise, or 0 where the record has none.
-    ramp : float, optional
-        Time that the deformation took to rise, s. By default that of the record, or 0 where it has none.
-    preload : float, optional
-        Response before the rise, in the record's unit. By default that of the record, or 0 where it has none.
-
-    Raises
-    ------
-    UsageError
-        If the hold's begin is not known, or lies behind the record.
+    `time` (N,) is in s on any clock, in order, `response` (N,) a stress or force. The hold begins at `begin` s, by
+    default at the end of the rise; the rise took `ramp` s and began from the response `preload`, by default those of
+    the record. All three are 0 where the record has no rise.
     """
     sign = 1.0 if np.median(response) >= 0 else -1.0
     first, peak, stop = _rows_of_hold(time, sign * response, begin)
@@ -188,9 +164,8 @@ def _find_ramp(t: np.ndarray, y: np.ndarray, peak: int) -> tuple[float, float, f
     base = float(y[:peak].min())
     top = float(y[peak])
     bottom = int(np.flatnonzero(y[:peak] <= base + _FLAT * (top - base))[-1])
-    flat = bottom >= 2 and t[bottom] - t[0] > 3 * _FLAT * (
-        t[peak] - t[bottom]
-    )  # in a rise it would be shorter
+    # in a rise it would be shorter
+    flat = bottom >= 2 and t[bottom] - t[0] > 3 * _FLAT * (t[peak] - t[bottom])
     base = float(np.median(y[: bottom + 1])) if flat else base
     share = (y - base) / (top - base)
     span = np.arange(bottom + 1, peak)

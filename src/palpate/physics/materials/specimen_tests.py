@@ -196,13 +196,7 @@ def first_invariant(mode: str) -> Callable[[np.ndarray], np.ndarray]:
 def columns_of_numbers(
     what: str, first: ArrayLike, other: str, second: ArrayLike
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return two columns as arrays (N,) of finite numbers.
-
-    Raises
-    ------
-    UsageError
-        If they are of unequal length, shorter than three, or hold what is no finite number.
-    """
+    """Return two columns as arrays (N,) of finite numbers, of equal length and at least three."""
     pair = []
     for name, values in ((what, first), (other, second)):
         try:

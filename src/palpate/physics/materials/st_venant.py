@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from palpate.physics.materials.material import NO_STATE, Volumetric, YoungAndPoisson
-from palpate.physics.materials.moduli import (
-    require_moduli,
-    unphysical,
-)
+from palpate.physics.materials.moduli import unphysical
 from palpate.physics.materials.tensors import Scalar, Tensor, identity, inner, matmul, trace, transpose
 
 __all__ = ["StVenantKirchhoff"]
@@ -49,7 +46,7 @@ class StVenantKirchhoff(YoungAndPoisson):
     law: ClassVar[str] = "St. Venant–Kirchhoff"
 
     def __post_init__(self) -> None:
-        require_moduli(self.young, self.poisson, self.density)
+        super().__post_init__()
         if self.poisson == 0.5:
             raise unphysical("Poisson's ratio of a St. Venant–Kirchhoff law", 0.5, "below 0.5")
 

@@ -42,14 +42,9 @@ _START = (0.86602985, 0.16642902, -0.04600526, 0.01764236, -0.00409941)
 
 
 def stretch_sums(C: Tensor, exponents: Sequence[float]) -> list[Scalar]:
-    """Return Σ λᵢ^a over the three principal stretches, for each exponent a; λᵢ² are the eigenvalues of C.
+    """Return Σ λᵢ^a over the three principal stretches, for each real exponent a; λᵢ² are the eigenvalues of C.
 
-    Parameters
-    ----------
-    C : Tensor
-        Right Cauchy–Green tensor FᵀF (..., 3, 3), symmetric and positive definite.
-    exponents : sequence of float
-        Any real numbers.
+    C = FᵀF (..., 3, 3) is symmetric and positive definite.
     """
     m, D = trace(C) / 3, deviator(C)
     J2, J3 = inner(D, D) / 2 / (m * m), determinant(D) / (m * m * m)  # of the deviator of C/m

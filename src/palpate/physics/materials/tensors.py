@@ -230,12 +230,7 @@ def positive_part(x: Scalar) -> Scalar:
 def gradient(function: Callable[[Tensor], Scalar], at: Tensor) -> Tensor:
     """Return ∂function/∂A at `at`, a tensor (..., 3, 3) of the derivatives with respect to A_ij.
 
-    Parameters
-    ----------
-    function : callable
-        Function from a tensor to a scalar, written with the functions of this module.
-    at : Tensor
-        A real NumPy array (..., 3, 3), or a 3 × 3 coefficient function.
+    The function takes a tensor to a scalar and is written with the functions of this module.
     """
     if is_symbolic(at):
         variable = at.MakeVariable()

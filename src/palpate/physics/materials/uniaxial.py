@@ -41,15 +41,7 @@ class ViscousFibres(NamedTuple):
 
 @dataclass(frozen=True)
 class UniaxialPlastic:
-    """Elastoplastic fibres with isotropic hardening.
-
-    Attributes
-    ----------
-    young : float
-        Young's modulus in Pa.
-    hardening : Hardening
-        For example ``LinearHardening(yield_stress=70e6, modulus=1e9)``.
-    """
+    """Elastoplastic fibres of Young's modulus in Pa, with isotropic hardening."""
 
     young: float
     hardening: Hardening
@@ -64,21 +56,9 @@ class UniaxialPlastic:
     def stress(
         self, strain: np.ndarray, state: PlasticFibres
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, PlasticFibres]:
-        """Return the answer of fibres to a strain.
+        """Return stress in Pa, tangent in Pa, energy in J/m³ and new state at a total strain (...).
 
-        Parameters
-        ----------
-        strain : (...) array
-            Total strain at the end of the step.
-        state : PlasticFibres
-            Internal variables at its beginning, of the same shape.
-
-        Returns
-        -------
-        stress, tangent, energy : (...) arrays
-            In Pa, Pa and J/m³: the energy is elastic energy plus all plastic work since the virgin state.
-        state : PlasticFibres
-            Internal variables at the end of the step.
+        The energy is elastic energy plus all plastic work since the virgin state.
         """
         trial = self.young * (strain - state.strain)
         excess = np.abs(trial) - self.hardening.flow_stress(state.accumulated)
@@ -94,15 +74,7 @@ class UniaxialPlastic:
 
 @dataclass(frozen=True)
 class UniaxialViscoelastic:
-    """Linear viscoelastic fibres.
-
-    Attributes
-    ----------
-    young : float
-        Instantaneous modulus in Pa.
-    prony : PronySeries
-        Relaxation of the modulus.
-    """
+    """Linear viscoelastic fibres of an instantaneous Young's modulus in Pa, which relaxes."""
 
     young: float
     prony: PronySeries
@@ -123,23 +95,10 @@ class UniaxialViscoelastic:
     def stress(
         self, strain: np.ndarray, state: ViscousFibres, dt: float | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, ViscousFibres]:
-        """Return the answer of fibres to a strain that grows evenly over a step.
+        """Return stress in Pa, tangent in Pa, energy in J/m³ and new state at a total strain (...) that grew evenly.
 
-        Parameters
-        ----------
-        strain : (...) array
-            Total strain at the end of the step.
-        state : ViscousFibres
-            Internal variables at its beginning.
-        dt : float or None
-            Length of the step in s; None is an instant, infinity is for ever.
-
-        Returns
-        -------
-        stress, tangent, energy : (...) arrays
-            In Pa, Pa and J/m³; the energy is the potential of the step's stress and no stored energy.
-        state : ViscousFibres
-            Internal variables at the end of the step.
+        `dt` is the length of the step in s; None is an instant, infinity is for ever. The energy is the potential of
+        the step's stress and no stored energy.
         """
         decay = _column(self.prony.decay(dt), state.stress)
         weight = _column(self.prony.shares, state.stress) * _column(self.prony.gain(dt), state.stress)

@@ -167,17 +167,7 @@ def material(**settings: Any) -> Callable[[Callable[..., Scalar]], UserMaterial]
 def material(function: Callable[..., Scalar] | None = None, **settings: Any) -> Any:
     """Make a function of F a material: ``@material`` or ``@material(density=1000.0, bulk=1e6)``.
 
-    Parameters
-    ----------
-    function : callable
-        As of `UserMaterial`.
-    **settings
-        The other attributes of `UserMaterial`.
-
-    Raises
-    ------
-    UsageError
-        As `UserMaterial`.
+    The settings are the other attributes of `UserMaterial`.
     """
     return UserMaterial(function, **settings) if function else lambda f: UserMaterial(f, **settings)
 

@@ -61,18 +61,9 @@ Part: TypeAlias = Literal["distortion", "all"]
 
 @dataclass(frozen=True)
 class Scaled(ShearAndBulk, MadeFrom):
-    """The law `base` times `factor`; a separate volumetric part stays as it is unless `part` is "all".
+    """The law `base` times a positive `factor`; a separate volumetric part stays as it is unless `part` is "all".
 
     A viscoelastic material turns into such a law once it has relaxed.
-
-    Attributes
-    ----------
-    base : Material
-        An elastic law.
-    factor : float
-        Pure number, positive.
-    part : "distortion" or "all"
-        Part of the law that is multiplied.
     """
 
     base: Material

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from palpate.physics.materials.material import NO_STATE, Isochoric
-from palpate.physics.materials.moduli import require_numbers
 from palpate.physics.materials.tensors import Scalar, Tensor, isochoric_first
 
 __all__ = ["Yeoh"]
@@ -43,10 +42,6 @@ class Yeoh(Isochoric):
     source: str = ""
 
     law: ClassVar[str] = "Yeoh"
-
-    def __post_init__(self) -> None:
-        require_numbers(f"A constant of {self.name}", (self.c10, self.c20, self.c30), "Pa")
-        self._check()
 
     @property
     def shear_modulus(self) -> float:

@@ -28,17 +28,12 @@ DEEPEST = 10  # files that include each other
 MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SUBMODEL")
 SOLID = re.compile(r"D?C3D(\d+)")
 SHELL = re.compile(r"(?:STRI|DS|SFM3D|M3D|R3D|CPS|CPE|CAX|S)(\d+)")
+# kinds of solid elements by their numbers of nodes
 KINDS = {
-    4: "tetra",
-    10: "tetra",
-    8: "hexahedron",
-    20: "hexahedron",
-    27: "hexahedron",
-    6: "wedge",
-    15: "wedge",
-} | {
-    5: "pyramid",
-    13: "pyramid",
+    **dict.fromkeys((4, 10), "tetra"),
+    **dict.fromkeys((8, 20, 27), "hexahedron"),
+    **dict.fromkeys((6, 15), "wedge"),
+    **dict.fromkeys((5, 13), "pyramid"),
 }
 # corners of the faces S1, S2, …
 SIDES = {
@@ -130,18 +125,11 @@ def _blocks(path: str, name: Path, depth: int = 0) -> Iterator[_Block]:
 
 
 def read_abaqus(path: str) -> MeshSource:
-    """Read the mesh of an input file.
+    """Read the mesh of an input file; FileFormatError and UsageError tell what is damaged, missing or not read.
 
     Regions are the sets of the solid sections, and where an element has none, its smallest set. Instances of an
     assembly are placed where it says; with several, their names stand before those of the sets. Surfaces are
     ``*SURFACE``, sets of nodes, and shell elements by their sets.
-
-    Raises
-    ------
-    FileFormatError
-        If the file holds no nodes, or numbers that belong to nothing.
-    UsageError
-        If the mesh is to be made by keywords that are not read, or a file that it includes is missing.
     """
     parts: dict[str, _Part] = {}
     root = _Part("")

@@ -110,15 +110,7 @@ def _for_meshio(path: str, content: bytes | None) -> Iterator[str]:
 
 
 def digest_of(path: str) -> str:
-    """SHA-256 of the content of a file and those that it names, as hexadecimal digits.
-
-    Raises
-    ------
-    UsageError
-        If there is no such file, or it is a folder or a device.
-    FileFormatError
-        If it is empty.
-    """
+    """Return SHA-256 of the content of a file and those that it names, as hexadecimal digits; refuse what is empty."""
     require_file(path)
     content = Path(path).read_bytes()
     if not content.strip():
@@ -154,17 +146,9 @@ def tell_repairs(path: str, notes: Sequence[str]) -> None:
 
 
 def read_with_meshio(path: str, content: bytes | None = None) -> Any:
-    """Read a file of a mesh, or this content in place of its own.
+    """Return a file of a mesh, or this content in place of its own, as a `meshio.Mesh`.
 
-    Returns
-    -------
-    meshio.Mesh
-        With an attribute `said`: what meshio printed while it read.
-
-    Raises
-    ------
-    FileFormatError
-        If the format is unknown or the file corrupt.
+    Its attribute `said` is what meshio printed while it read. FileFormatError if no reader takes it or it is corrupt.
     """
     import struct
     from xml.etree.ElementTree import ParseError

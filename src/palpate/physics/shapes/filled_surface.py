@@ -35,9 +35,8 @@ __all__ = ["bodies_apart", "fill_surface", "name_parts", "read_surface"]
 
 LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
 FLAT = 1e-7  # thickness over length below which a surface lies in a plane
-SHARP = (
-    0.05  # weight of a normal's direction against distance over the body's length, where faces are compared
-)
+# weight of a normal's direction against distance over the body's length, where faces are compared
+SHARP = 0.05
 
 
 def read_surface(path: str, unit: str, simplify: float | None = None) -> tuple[Trimesh, Surface]:
@@ -129,12 +128,9 @@ def bodies_apart(topology: Trimesh) -> tuple[str, ...]:
 def name_parts(
     topology: Trimesh, surface: Surface, patches: tuple[SurfacePatch, ...], angle: float
 ) -> BodyMesh:
-    """Return the surface with names: those that the file gives to parts of it, and of the rest by sharp edges.
+    """Return the surface, without tetrahedra, with names: those that the file gives to its parts, then by sharp edges.
 
-    Returns
-    -------
-    BodyMesh
-        Without tetrahedra. Names are the file's, then ``face 1``, ``face 2``, … by falling area.
+    Names are the file's, then ``face 1``, ``face 2``, … by falling area.
     """
     part = segments(topology, angle)
     rest = np.ones(len(part), dtype=bool)

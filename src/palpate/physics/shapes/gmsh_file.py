@@ -21,13 +21,8 @@ __all__ = ["is_gmsh_4", "read_gmsh"]
 # Gmsh's number of an element: its kind by the corners, and the number of its nodes
 ELEMENTS = {
     **{15: ("vertex", 1), 1: ("line", 2), 8: ("line", 3), 26: ("line", 4), 27: ("line", 5), 28: ("line", 6)},
-    **{
-        2: ("triangle", 3),
-        9: ("triangle", 6),
-        20: ("triangle", 9),
-        21: ("triangle", 10),
-        23: ("triangle", 15),
-    },
+    **{2: ("triangle", 3), 9: ("triangle", 6), 20: ("triangle", 9), 21: ("triangle", 10)},
+    **{23: ("triangle", 15)},
     **{3: ("quad", 4), 10: ("quad", 9), 16: ("quad", 8), 36: ("quad", 16), 37: ("quad", 25)},
     **{4: ("tetra", 4), 11: ("tetra", 10), 29: ("tetra", 20), 30: ("tetra", 35), 31: ("tetra", 56)},
     **{5: ("hexahedron", 8), 12: ("hexahedron", 27), 17: ("hexahedron", 20), 92: ("hexahedron", 64)},
@@ -89,14 +84,7 @@ def read_gmsh(path: str) -> MeshSource:
     """Read a mesh of Gmsh in format 4.1, as text or binary, or in format 4.0 as text.
 
     An entity may belong to several physical groups, or to none. Where there is no physical group of a dimension,
-    the geometry's own entities are groups by their numbers.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is cut short or damaged.
-    UsageError
-        If it is one part of a partitioned mesh.
+    the geometry's own entities are groups by their numbers. One part of a partitioned mesh is refused.
     """
     content = read_part(path)
     if b"$PartitionedEntities" in content:

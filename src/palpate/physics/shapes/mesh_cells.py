@@ -14,6 +14,13 @@ from palpate.physics.shapes.surface_repair import unite_points
 __all__ = ["SIDES", "duplicate_cells", "merge_nodes", "shortest_edge", "split_cells"]
 
 SAME = 1e-6  # of the body's length, below which two nodes are at one place
+# the corners of a cell as those of its mirror image are numbered
+MIRRORED = {
+    "tetra": [0, 2, 1, 3],
+    "pyramid": [0, 3, 2, 1, 4],
+    "wedge": [3, 4, 5, 0, 1, 2],
+    "hexahedron": [4, 5, 6, 7, 0, 1, 2, 3],
+}
 SHORT = 0.1  # of the shortest edge: nodes further apart are meant to be two
 # corners of the faces of each kind, counter-clockwise as seen from outside where the cell is right-handed
 SIDES = {
@@ -154,10 +161,7 @@ def _turn_right_handed(points: np.ndarray, kind: str, cells: np.ndarray) -> np.n
             a, b, c = points[cells[:, side[0]]], points[cells[:, side[k]]], points[cells[:, side[k + 1]]]
             volume += np.einsum("ni,ni->n", np.cross(b - a, c - a), a - centre) / 6
     if len(cells) and (volume < 0).all():
-        mirror = {"tetra": [0, 2, 1, 3], "pyramid": [0, 3, 2, 1, 4], "wedge": [3, 4, 5, 0, 1, 2]} | {
-            "hexahedron": [4, 5, 6, 7, 0, 1, 2, 3]
-        }
-        return cells[:, mirror[kind]]
+        return cells[:, MIRRORED[kind]]
     return cells
 
 

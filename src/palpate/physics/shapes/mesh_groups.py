@@ -25,53 +25,28 @@ THIN = ("vertex", "line", "triangle", "quad", "polygon")
 class Group:
     """Cells, faces or nodes that a file calls by a name.
 
-    Attributes
-    ----------
-    name : str
-        The name, without signs that mean something in patterns of names.
-    members : int array
-        Of a region: indices of cells, in the order of the blocks. Of a surface: corners (n, 4) of faces, the last
-        one of a triangle twice. Of a set of nodes: nodes.
-    numbered : bool
-        True where the file has a number only.
-    rank : int
-        Groups of a lower rank go before others, whatever their size.
+    `members` are of a region: indices of cells, in the order of the blocks; of a surface: corners (n, 4) of faces, the
+    last one of a triangle twice; of a set of nodes: nodes.
     """
 
-    name: str
+    name: str  # without signs that mean something in patterns of names
     members: np.ndarray
-    numbered: bool = False
-    rank: int = 1
+    numbered: bool = False  # True where the file has a number only
+    rank: int = 1  # groups of a lower rank go before others, whatever their size
 
 
 @dataclass(eq=False)
 class MeshSource:
-    """The content of a file.
+    """The content of a file."""
 
-    Attributes
-    ----------
-    path : str
-        The file.
-    points : (n, 3) array
-        Nodes in the unit of the file.
-    solids : list of (str, (k, corners) int array)
-        Cells of volume by kind, a key of `SOLIDS`, by their corners.
-    regions, faces, node_sets : list of Group
-        Groups of cells of volume, of faces and of nodes.
-    others : Counter
-        Numbers of all other cells, by kind.
-    notes : list of str
-        A sentence about each thing that was passed over or decided.
-    """
-
-    path: str
-    points: np.ndarray
+    path: str  # the file
+    points: np.ndarray  # (n, 3) nodes in the unit of the file
     solids: list[tuple[str, np.ndarray]] = field(default_factory=list)
-    regions: list[Group] = field(default_factory=list)
+    regions: list[Group] = field(default_factory=list)  # of cells of volume
     faces: list[Group] = field(default_factory=list)
     node_sets: list[Group] = field(default_factory=list)
-    others: Counter[str] = field(default_factory=Counter)
-    notes: list[str] = field(default_factory=list)
+    others: Counter[str] = field(default_factory=Counter)  # all other cells, by kind
+    notes: list[str] = field(default_factory=list)  # on each thing that was passed over or decided
 
     def add_solids(self, kind: str, corners: np.ndarray) -> None:
         """Add cells of volume."""
@@ -89,13 +64,7 @@ class MeshSource:
 
 
 def require_sound(source: MeshSource) -> None:
-    """Refuse numbers of nodes and cells that are not there, and nodes at no place, in whatever format they stood.
-
-    Raises
-    ------
-    FileFormatError
-        With the first number that can't be.
-    """
+    """Refuse numbers of nodes and cells that are not there, and nodes at no place, in whatever format they stood."""
     nodes, cells = len(source.points), sum(len(block) for _, block in source.solids)
     parts = [("A cell", block, nodes) for _, block in source.solids]
     parts += [(f"The surface {group.name!r}", group.members, nodes) for group in source.faces]

@@ -17,15 +17,7 @@ INTERFACE = "between regions"  # name of the faces that are no part of the outer
 
 
 def members(name: str, surfaces: Iterable[str]) -> tuple[str, ...]:
-    """Surfaces that a name stands for: itself, or the four upright faces of a box for ``"side"``; or none.
-
-    Parameters
-    ----------
-    name : str
-        Name of a surface or of a group.
-    surfaces : iterable of str
-        Names of the body's surfaces.
-    """
+    """Surfaces that a name stands for: itself, or the four upright faces of a box for ``"side"``; or none."""
     names = tuple(surfaces)
     if name in names:
         return (name,)
@@ -51,13 +43,7 @@ def require_known(kind: str, name: str, known: Iterable[str]) -> None:
 
 
 def require_name(what: str, name: Any) -> None:
-    """Refuse a name that NGSolve would read as a pattern.
-
-    Raises
-    ------
-    UsageError
-        If it has other signs than letters, digits, spaces, - and _.
-    """
+    """Refuse a name that NGSolve would read as a pattern: with other signs than letters, digits, spaces, - and _."""
     if isinstance(name, str) and re.fullmatch(r"\w[\w \-]*", name):
         return
     raise UsageError(

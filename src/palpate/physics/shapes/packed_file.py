@@ -45,13 +45,7 @@ _STATED = {
 
 
 def require_file(path: str | os.PathLike[str]) -> None:
-    """Refuse what is no file that ends: a folder, a device, a pipe, or nothing at all.
-
-    Raises
-    ------
-    UsageError
-        With what it is.
-    """
+    """Refuse what is no file that ends: a folder, a device, a pipe, or nothing at all."""
     file = Path(path)
     try:
         size = file.stat().st_size
@@ -73,15 +67,7 @@ def require_file(path: str | os.PathLike[str]) -> None:
 
 
 def read_part(path: str | os.PathLike[str]) -> bytes:
-    """Return the bytes of a part's file; of one packed with gzip those that are packed in it.
-
-    Raises
-    ------
-    UsageError
-        If there is no such file, or it is too large.
-    FileFormatError
-        If it is packed and damaged.
-    """
+    """Return the bytes of a part's file; of one packed with gzip those that are packed in it."""
     require_file(path)
     content = read_input(path)
     if Path(path).suffix.lower() != ".gz":
@@ -113,11 +99,6 @@ def require_counts(path: str, content: bytes) -> None:
     """Refuse a file that states more nodes or cells than its bytes can hold, or fewer than none.
 
     A node or a cell takes a byte at least; VTK's own compression makes as much of a byte as deflate can.
-
-    Raises
-    ------
-    FileFormatError
-        With the number that it states.
     """
     pattern = _STATED.get(part_ending(path))
     if pattern is None:

@@ -15,10 +15,8 @@ Point = tuple[float, float]
 def split_concave_polygons(content: bytes) -> bytes:
     """Return the text of an OBJ file with triangles in place of the polygons that are not convex.
 
-    Raises
-    ------
-    ValueError, IndexError
-        If a coordinate or the number of a corner is none, or such a polygon has more corners than `MOST`.
+    ValueError or IndexError if a coordinate or the number of a corner is none, or such a polygon has more corners than
+    `MOST`.
     """
     places: list[tuple[float, ...]] = []
     lines = content.split(b"\n")

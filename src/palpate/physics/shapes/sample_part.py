@@ -46,18 +46,7 @@ def kidney_surface(subdivisions: int = SUBDIVISIONS) -> tuple[np.ndarray, np.nda
 
 
 def write_sample_part(path: str | os.PathLike[str]) -> Path:
-    """Write the kidney-like organ as a binary STL file in mm.
-
-    Parameters
-    ----------
-    path : path
-        File to write, with the ending .stl.
-
-    Raises
-    ------
-    UsageError
-        If the name has another ending.
-    """
+    """Write the kidney-like organ as a binary STL file in mm; the name ends in .stl."""
     from trimesh import Trimesh
 
     path = Path(path)

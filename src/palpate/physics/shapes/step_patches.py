@@ -22,30 +22,14 @@ MARK = "#"  # before a face's number; `plain_name` leaves none in the names of a
 
 @dataclass(frozen=True)
 class FacePatches:
-    """Patches to be named in a mesh of a solid, whose faces are called by their numbers until then.
+    """Patches to be named in a mesh of a solid, whose faces are called by their numbers until then."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the file, face by face.
-    centres : (f, 3) array
-        Of the faces, m.
-    patches : tuple of SurfacePatch
-        In order; those without a direction take whole faces by their centres.
-    """
-
-    names: tuple[str, ...]
-    centres: np.ndarray
-    patches: tuple[SurfacePatch, ...]
+    names: tuple[str, ...]  # of the file, face by face
+    centres: np.ndarray  # (f, 3) of the faces, m
+    patches: tuple[SurfacePatch, ...]  # those without a direction take whole faces by their centres
 
     def name_mesh(self, mesh: Any) -> None:
-        """Give the faces of a `netgen.meshing.Mesh` their names, and parts of them faces of their own.
-
-        Raises
-        ------
-        UsageError
-            If a patch contains nothing.
-        """
+        """Give the faces of a `netgen.meshing.Mesh` their names, and parts of them faces of their own."""
         points = np.array([point.p for point in mesh.Points()])
         elements = list(mesh.Elements2D())
         corners = points[np.array([[vertex.nr - 1 for vertex in e.vertices[:3]] for e in elements])]

@@ -18,7 +18,15 @@ from palpate.physics.shapes.surface_repair import place
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-__all__ = ["Shells", "closest_points", "require_closed", "shells_of", "surface_gap", "touching_shells"]
+__all__ = [
+    "Shells",
+    "closest_points",
+    "require_closed",
+    "shells_of",
+    "surface_gap",
+    "touching_shells",
+    "winding_number",
+]
 
 FLUSH = 1e-6  # of the body's length, below which two faces lie on each other
 CLOSE = 64  # triangles whose distance to a point is measured
@@ -26,13 +34,7 @@ PAIRS = 500_000  # pairs of triangles that are compared at a time
 
 
 def require_closed(surface: Trimesh, source: str) -> None:
-    """Refuse a surface that bounds no body: empty, open, not a manifold, facing inwards or cutting itself.
-
-    Raises
-    ------
-    UsageError
-        Naming the fault, how many edges have it and where.
-    """
+    """Refuse a surface that bounds no body: empty, open, not a manifold, facing inwards or cutting itself."""
     if not len(surface.faces):
         raise UsageError(
             f"{source} holds no triangles.",
@@ -133,21 +135,11 @@ def _neighbours(corners: np.ndarray, slack: float) -> Iterator[tuple[np.ndarray,
 
 @dataclass(frozen=True, eq=False)
 class Shells:
-    """The closed shells of a surface.
+    """The closed shells of a surface."""
 
-    Attributes
-    ----------
-    shell_of : (t,) int array
-        Number of each triangle's shell, from 0.
-    volumes : (s,) array
-        Volume that each encloses, m³; negative where its triangles face inwards, as those of a cavity do.
-    inside : tuple of tuple of int
-        For each shell those that contain it.
-    """
-
-    shell_of: np.ndarray
-    volumes: np.ndarray
-    inside: tuple[tuple[int, ...], ...]
+    shell_of: np.ndarray  # (t,) number of each triangle's shell, from 0
+    volumes: np.ndarray  # (s,) m³; negative where triangles face inwards, as those of a cavity do
+    inside: tuple[tuple[int, ...], ...]  # for each shell those that contain it
 
 
 def shells_of(surface: Trimesh) -> Shells:
@@ -168,19 +160,20 @@ def shells_of(surface: Trimesh) -> Shells:
             for j in range(count)
             if j != i
             and bool((low[j] <= low[i]).all() and (high[j] >= high[i]).all())
-            and abs(_winding(parts[i][0, 0], parts[j])) > 0.5
+            and abs(winding_number(parts[j], parts[i][0, 0])) > 0.5
         )
         for i in range(count)
     )
     return Shells(np.asarray(shell), volumes, inside)
 
 
-def _winding(point: np.ndarray, corners: np.ndarray) -> float:
-    """Times that triangles (t, 3, 3) go around a point: their solid angles over 4π.
+def winding_number(corners: np.ndarray, place: np.ndarray) -> float:
+    """Return the number of times a closed surface winds around a place (3,) in m: 1 inside, 0 outside.
 
-    Solid angle of a triangle by Van Oosterom & Strackee 1983 (IEEE Trans. Biomed. Eng. 30, 125-126).
+    The triangles (t, 3, 3) in m are counter-clockwise as seen from outside. The number is the sum of their solid angles
+    over 4π (Van Oosterom & Strackee 1983, IEEE Trans. Biomed. Eng. 30, 125-126).
     """
-    a, b, c = np.moveaxis(corners - point, 1, 0)
+    a, b, c = np.moveaxis(corners - place, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     above = np.einsum("ti,ti->t", np.cross(a, b), c)
     ab, bc, ca = (np.einsum("ti,ti->t", u, v) for u, v in ((a, b), (b, c), (c, a)))

@@ -32,27 +32,13 @@ PASSES = 20  # of splitting at nodes on edges; each meets nodes that the one bef
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles in space.
+    """Triangles in space."""
 
-    Attributes
-    ----------
-    points : (n, 3) array
-        Positions in m.
-    triangles : (t, 3) int array
-        Nodes, counter-clockwise as seen from outside.
-    label_of : (t,) int array
-        Index into `labels`.
-    labels : tuple of str
-        Names that the file gives to parts of the surface.
-    notes : tuple of str
-        A sentence about each thing that was repaired.
-    """
-
-    points: np.ndarray
-    triangles: np.ndarray
-    label_of: np.ndarray
-    labels: tuple[str, ...] = ("",)
-    notes: tuple[str, ...] = field(default=())
+    points: np.ndarray  # (n, 3) positions in m
+    triangles: np.ndarray  # (t, 3) nodes, counter-clockwise as seen from outside
+    label_of: np.ndarray  # (t,) index into `labels`
+    labels: tuple[str, ...] = ("",)  # names that the file gives to parts of the surface
+    notes: tuple[str, ...] = field(default=())  # a sentence about each thing that was repaired
 
     @property
     def length(self) -> float:
@@ -270,11 +256,6 @@ def repair_surface(surface: Surface) -> Surface:
     """Return the surface with united corners, without flat and doubled triangles, and a note about each repair.
 
     What is open or ambiguous after that is left as it is: `require_closed` says where.
-
-    Parameters
-    ----------
-    surface : Surface
-        Triangles as a file holds them, each with corners of its own for example.
     """
     united = _unite(surface, unite_points(surface.points, SAME * surface.length))
     united = without_spare_nodes(united)

@@ -4,6 +4,9 @@ Edges are collapsed by rising quadric error (Garland & Heckbert 1997, Surface si
 metrics, SIGGRAPH, 209-216). Each pass takes many edges that are no neighbours of each other. How far the result is
 from the surface is measured afterwards, in both directions; where that is too far, it is made anew with smaller errors.
 
+A library of such collapses (fast-simplification 0.2) is quicker, but leaves slender triangles: Netgen takes them for
+features and makes two to three times as many tetrahedra, of a worst quality of 0.04 instead of 0.36.
+
 simplify_surface   the surface with fewer triangles, and a sentence about it
 """
 
@@ -69,12 +72,8 @@ def _collapse(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Collapse edges that leave the nodes of the surface within the tolerance in m of the triangles around them.
 
-    Returns
-    -------
-    points, triangles, label_of : arrays
-        The new surface, on the old numbers of nodes.
-    lead : (n,) int array
-        Node that stands for each one of the old surface.
+    Returns points, triangles and labels of the new surface on the old numbers of nodes, and for each old node (n,) the
+    node that stands for it.
     """
     points, triangles, label_of = surface.points.copy(), surface.triangles, surface.label_of
     lead = np.arange(len(points))

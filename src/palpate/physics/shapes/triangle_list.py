@@ -25,13 +25,7 @@ def triangle_text(indices: np.ndarray, count: int) -> str:
 
 
 def read_triangles(text: str) -> tuple[np.ndarray, int]:
-    """Return triangles (k,), and the number of all triangles of the surface, from a text.
-
-    Raises
-    ------
-    UsageError
-        If the text is no list of triangles, or names one beyond the last.
-    """
+    """Return triangles (k,), and the number of all triangles of the surface, from a text."""
     match = _FORM.fullmatch(text)
     if match is None:
         raise _no_list(text, "Its form is runs of numbers from 0 on, and the number of all triangles.")

@@ -18,25 +18,10 @@ __all__ = ["read_grid", "read_polydata"]
 VTK_CELLS = {
     **{5: "triangle", 22: "triangle6", 9: "quad", 23: "quad8", 28: "quad9", 10: "tetra", 24: "tetra10"},
     **{12: "hexahedron", 25: "hexahedron20", 29: "hexahedron27", 13: "wedge", 26: "wedge15", 14: "pyramid"},
-    **{
-        27: "pyramid13",
-        69: "triangle",
-        70: "quad",
-        71: "tetra",
-        72: "hexahedron",
-        73: "wedge",
-        74: "pyramid",
-    },
-    **{
-        1: "vertex",
-        2: "vertex",
-        3: "line",
-        4: "line",
-        21: "line",
-        68: "line",
-        42: "polyhedron",
-        7: "polygon",
-    },
+    **{27: "pyramid13", 69: "triangle", 70: "quad", 71: "tetra", 72: "hexahedron", 73: "wedge"},
+    **{74: "pyramid", 42: "polyhedron", 7: "polygon"},
+    **dict.fromkeys((1, 2), "vertex"),
+    **dict.fromkeys((3, 4, 21, 68), "line"),
 }
 VOXEL, PIXEL = 11, 8  # VTK's boxes, whose corners run along x first
 

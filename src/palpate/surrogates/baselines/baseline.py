@@ -115,6 +115,10 @@ class Baseline(ABC):
         """The touched surface at rest; None where nothing is touched."""
         return None
 
+    def with_surface(self, surface: TouchedSurface) -> Baseline:
+        """Return the same baseline on another touched surface; itself where it has none."""
+        return self
+
     @property
     def radius(self) -> float:
         """Radius of the probe, m; not-a-number where there is none, or an input is it."""

@@ -17,18 +17,16 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
+from palpate.kernels import part
 from palpate.surrogates.baselines.baseline import Baseline, register_baseline
 from palpate.surrogates.energy_kernels import GRADIENT, HESSIAN, ROOT, VECTORS, Compiled
 from palpate.surrogates.memories import Amplitude
 from palpate.units import Range
 
 __all__ = ["ConstantBaseline", "require_axes"]
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @register_baseline
@@ -119,7 +117,7 @@ def require_axes(axes: np.ndarray) -> None:
         )
 
 
-@_jit
+@part
 def _enter(position, parameters, moved, base, small, numbers, args) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill a constant energy without derivatives."""
     base[0], base[2], base[3] = args[0], args[0], 0.0

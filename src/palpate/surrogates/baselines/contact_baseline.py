@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 
+from palpate.kernels import part
 from palpate.surrogates.baselines.baseline import Baseline, register_baseline
 from palpate.surrogates.contact_law import ContactLaw, law_at
 from palpate.surrogates.continuation import saturated
@@ -40,7 +40,6 @@ from palpate.units import Range
 
 __all__ = ["ContactBaseline", "depth_series"]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 # step over the probe's radius, of the difference that finds the third derivative of the distance
 _STEP = 1e-3
@@ -90,6 +89,10 @@ class ContactBaseline(Baseline):
     def surface(self) -> TouchedSurface:
         """The touched surface at rest."""
         return self.touched
+
+    def with_surface(self, surface: TouchedSurface) -> ContactBaseline:
+        """Return the same contact on another surface."""
+        return replace(self, touched=surface)
 
     @property
     def radius(self) -> float:
@@ -203,7 +206,7 @@ def depth_series(X: np.ndarray, surface: TouchedSurface, radius: float) -> np.nd
     return np.asarray(np.unique(np.hstack([places, X[:, 3:]]), axis=0, return_inverse=True)[1].ravel())
 
 
-@_jit
+@part
 def _enter(position, parameters, moved, base, small, numbers, args) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill the law's energy and derivatives; move the place at which ℓ is asked to the saturated depth."""
     own, surface = args
@@ -227,7 +230,7 @@ def _enter(position, parameters, moved, base, small, numbers, args) -> bool:  # 
     return True
 
 
-@_jit
+@part
 def _bend_into(x, g, small, step, surface) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Derivative of ∇²d along g into small[BEND], by differences of fourth order; symmetric as ∇²d is."""
     size = math.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
@@ -244,7 +247,7 @@ def _bend_into(x, g, small, step, surface) -> None:  # type: ignore[no-untyped-d
                 small[BEND, i, j] += weight * size / (12.0 * step) * other[i, j]
 
 
-@_jit
+@part
 def _leave(position, base, small, numbers, args) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Take ∇ℓ and ∇²ℓ by c̃ = c + m ∇d, m = s − σ(s), to those by c.
 

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 
 from palpate.checks import own_arrays
+from palpate.kernels import part
 from palpate.surrogates.baselines.baseline import Baseline, register_baseline
 from palpate.surrogates.baselines.constant_baseline import require_axes
 from palpate.surrogates.baselines.rest_stiffness import RestStiffness, entries, monomials, root_at
@@ -30,7 +30,6 @@ from palpate.units import Range, bounds
 
 __all__ = ["PadBaseline"]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 _EVEN = ("the same everywhere", "linear in place", "quadratic in place")
 
 
@@ -148,14 +147,14 @@ class PadBaseline(Baseline):
             return np.log(U0), first, second - first[:, :, None] * first[:, None]
 
 
-@_jit
+@part
 def _enter(position, parameters, moved, base, small, numbers, args) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Measure the displacement; a hand that holds is always in contact."""
     base[1] = math.sqrt(position[0] ** 2 + position[1] ** 2 + position[2] ** 2)
     return True
 
 
-@_jit
+@part
 def _rest(position, xi, base, small, args) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001, PLR0912
     """Fill ½ ‖S u‖² and its derivatives, with S at the scaled inputs."""
     axes, coefficients, pairs = args[0], args[1], args[2]
@@ -201,7 +200,7 @@ def _rest(position, xi, base, small, args) -> None:  # type: ignore[no-untyped-d
             root[0, i] = b[i] / base[3] if base[3] > 0.0 else 0.0
 
 
-@_jit
+@part
 def _log(xi, g, H, scales, args) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Add the polynomial P."""
     return stiffening_into(xi, g, H, scales, args[3], args[4], args[5])

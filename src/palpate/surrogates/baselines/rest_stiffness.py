@@ -16,14 +16,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
+from palpate.kernels import part
 
 __all__ = ["MOST", "RestStiffness", "entries", "monomials", "root_at", "terms"]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 MOST = 2  # highest degree
 _SIZES = {1: 1, 3: 2, 6: 3}  # felt coordinates by the number of a symmetric matrix's entries
 
@@ -131,7 +130,7 @@ class RestStiffness:
         return self.coefficients, terms(self.count, self.degree)
 
 
-@_jit
+@part
 def root_at(zeta, S, k, coefficients, pairs) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill the first (k, k) of S (3, 3) at scaled inputs ζ."""
     S[:, :] = 0.0

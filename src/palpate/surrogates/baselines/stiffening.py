@@ -11,14 +11,13 @@ from itertools import combinations_with_replacement
 from typing import Annotated
 
 import numpy as np
-from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
+from palpate.kernels import part
 
 __all__ = ["HIGHEST", "Stiffening", "exponents", "powers", "stiffening_into"]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 HIGHEST = 5  # highest degree of the polynomial
 
 
@@ -108,7 +107,7 @@ class Stiffening:
         return self.coefficients, self.exponents, np.ones((self.exponents.shape[1], HIGHEST + 1))
 
 
-@_jit
+@part
 def _product(e, table, i, j) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """∏ ξ_k^{e_k}, differentiated by ξ_i and ξ_j; −1 for none."""
     t = 1.0
@@ -124,7 +123,7 @@ def _product(e, table, i, j) -> float:  # type: ignore[no-untyped-def]  # noqa: 
     return t
 
 
-@_jit
+@part
 def stiffening_into(xi, g, H, scales, coefficients, exponents, table) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """P at ξ (n,); its slopes and curvatures by the first unscaled inputs are added to g (q,) and H (q, q)."""
     for k in range(xi.size):

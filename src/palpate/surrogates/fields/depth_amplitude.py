@@ -15,16 +15,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from palpate.errors import UsageError
+from palpate.kernels import for_rows, kernel, part
 
 __all__ = ["AMPLITUDES", "DepthAmplitude", "amplitude_at"]
 
 _POWERS = {"linear": 1.0, "hertz": 1.5, "square": 2.0, "series": 2.0}
 AMPLITUDES = tuple(_POWERS)
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @dataclass(frozen=True)
@@ -72,11 +70,11 @@ class DepthAmplitude:
         """Values f at depths s (m) of any shape; zero where s ≤ 0."""
         s = np.asarray(s, dtype=np.float64)
         out = np.empty(s.size)
-        _amplitudes_into(s.ravel(), out, *self.numbers())
+        for_rows(_amplitudes_into, s.size)(s.ravel(), out, *self.numbers())
         return out.reshape(s.shape)
 
 
-@_jit
+@part
 def amplitude_at(s, power, deepest, length) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Values f at one depth s (m)."""
     if s <= 0.0:
@@ -92,7 +90,7 @@ def amplitude_at(s, power, deepest, length) -> float:  # type: ignore[no-untyped
     return float(f * math.sqrt((1.0 + deepest / length) / (1.0 + s / length)))
 
 
-@_jit
+@kernel
 def _amplitudes_into(s, out, power, deepest, length) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     for i in range(s.size):
         out[i] = amplitude_at(s[i], power, deepest, length)

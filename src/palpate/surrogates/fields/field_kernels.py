@@ -27,9 +27,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, uint64
+from numba import uint64
 
-from palpate.network.network_kernels import combine, value_into
+from palpate.kernels import kernel, part
+from palpate.network.network_kernels import combine, point_into
 from palpate.surrogates.continuation import saturated
 from palpate.surrogates.fields.depth_amplitude import amplitude_at
 from palpate.surrogates.fields.local_mode import OFFSETS, LocalMode
@@ -45,14 +46,11 @@ __all__ = [
     "profile_into",
 ]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
-# a product and a sum rounded once: faster, and no less exact
-_fused = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 FRAME = 8  # numbers of a place before the further inputs
 SIXTH = 1.0 / 6.0
 
 
-@_jit
+@part
 def _taken(lines, limits) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Every input of line 1 saturates beyond its range."""
     for i in range(lines.shape[1]):
@@ -63,7 +61,7 @@ def _taken(lines, limits) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN0
             lines[1, i] = saturated(t, high, width)[0]
 
 
-@_jit
+@kernel
 def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface, net) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Coefficients into z and the probe's frame into place; whether there is contact.
 
@@ -97,13 +95,13 @@ def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface,
     _taken(lines, limits)
     for i in range(3, lines.shape[1]):
         place[FRAME - 3 + i] = lines[1, i]
-    value_into(lines[1], b, *net)
+    point_into(lines[1], b, *net)
     for k in range(b.size):
         z[1 + k] = f * b[k]
     return True
 
 
-@_jit
+@part
 def _splines(u, weights) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """The four uniform cubic B-splines at u in [0, 1] of a cell into weights (4,)."""
     v = 1.0 - u
@@ -111,7 +109,7 @@ def _splines(u, weights) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN00
     weights[2], weights[3] = (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0, u * u * u / 6.0
 
 
-@_jit
+@part
 def _products(place, powers, axes, scales, chebyshev, values) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Polynomials of the place and the further inputs into the first of values."""
     a = axes.shape[0]
@@ -131,7 +129,7 @@ def _products(place, powers, axes, scales, chebyshev, values) -> None:  # type: 
         values[m] = value
 
 
-@_jit
+@kernel
 def profile_into(profile, place, deepest, table, varied, powers, axes, scales, chebyshev, weights) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """The local mode at one touch, f included: splines in ρ times 1 and the offset's coordinates over L; see above."""
     four, share, f = weights[:4], min(place[0] / deepest, 1.0), place[1]
@@ -170,7 +168,8 @@ def profile_into(profile, place, deepest, table, varied, powers, axes, scales, c
                 profile[i, 1 + e, c] -= across * place[5 + e] * place[5 + c]
 
 
-@_fused
+# a product and a sum rounded once: faster, and no less exact
+@kernel(fastmath={"contract"})
 def moving_into(y, place, profile, line, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Add the moving part to y (nodes · components,); line (4 · components,) is scratch."""
     r, components = profile.shape[0], profile.shape[2]
@@ -197,7 +196,7 @@ def moving_into(y, place, profile, line, reach, nodes, points) -> None:  # type:
             y[at + c] += moved + e * line[2 * components + c] + h * line[3 * components + c]
 
 
-@_jit
+@kernel
 def field_into(y, z, place, rows, profile, line, reach, nodes, points) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """The field y (nodes · components,) from coefficients, place and profile; rows (1 + k, …): rest, modes."""
     if place[1] == 0.0 and z[0] == 1.0:

@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.format import count
+from palpate.kernels import kernel
 from palpate.network import Network
-from palpate.network.network_kernels import value_into
+from palpate.network.network_kernels import point_into
 from palpate.units import Range, bounds
 
 if TYPE_CHECKING:
@@ -213,10 +213,7 @@ class NodeEvaluator:
         _node_into(self.inputs, self.value, *self._limits, *self._answer, *self._net)
 
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
-
-
-@_jit
+@kernel
 def _ask(position, force, parameters, inputs, directions, touched, further, by_place) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill the field's inputs: what the hand pulls with, the loads elsewhere, and its place where that is asked."""
     for a in range(touched.size):
@@ -231,7 +228,7 @@ def _ask(position, force, parameters, inputs, directions, touched, further, by_p
         inputs[further[b]] = parameters[b]
 
 
-@_jit
+@kernel
 def _node_into(inputs, value, low, high, mirror, mirrors, x, y, components, *net) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN002
     """Fill the held node's value at inputs (n,), those beyond the trained ranges at their edge."""
     other = mirrors and inputs[0] < 0.0
@@ -239,7 +236,7 @@ def _node_into(inputs, value, low, high, mirror, mirrors, x, y, components, *net
         asked = -inputs[i] if other else inputs[i]
         x[i] = asked if math.isnan(asked) else min(max(asked, low[i]), high[i])
     value[:] = 0.0
-    value_into(x, y, *net)
+    point_into(x, y, *net)
     for i in range(components.size):
         if components[i] >= 0:
             value[components[i]] = y[i]

@@ -31,20 +31,18 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.format import share
+from palpate.kernels import kernel, part
 from palpate.surrogates.memories.memory import Carry, Memory, MemoryState, register_memory
 from palpate.surrogates.memories.patches import Patches, nearest_points
 
 __all__ = ["Indentation", "IndentationState"]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
-
-@_jit
+@part
 def _weights_into(centre, points, width, weights, mean) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """w_j of a centre and their mean point; the nearest one's exponent is taken out, so that none underflows."""
     nearest = math.inf
@@ -65,7 +63,7 @@ def _weights_into(centre, points, width, weights, mean) -> None:  # type: ignore
             mean[a] += weights[j] * points[j, a]
 
 
-@_jit
+@part
 def _piece(x, knots):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Index of the piece of a table that x is in; the last one goes on."""
     i = 0
@@ -74,7 +72,7 @@ def _piece(x, knots):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     return i
 
 
-@_jit
+@part
 def _stiffening(p, residual, table):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """κ and κ′ at p."""
     if p >= residual[-1]:
@@ -84,7 +82,7 @@ def _stiffening(p, residual, table):  # type: ignore[no-untyped-def]  # noqa: AN
     return table[i] + slope * (p - residual[i]), slope
 
 
-@_jit
+@part
 def _virgin_residual(q, residual, reach):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """p on the virgin curve: Q(p) = q; never beyond q itself, also where the last piece goes on."""
     if q <= reach[0]:
@@ -96,14 +94,14 @@ def _virgin_residual(q, residual, reach):  # type: ignore[no-untyped-def]  # noq
     return p
 
 
-@_jit
+@part
 def _stored(q, p, residual, table):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """V, J."""
     over = max(q - p, 0.0)
     return 0.5 * _stiffening(p, residual, table)[0] * over * over
 
 
-@_jit
+@part
 def _met(weights, depths):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """p(c) = Σ w_j p_j."""
     p = 0.0
@@ -112,7 +110,7 @@ def _met(weights, depths):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN2
     return p
 
 
-@_jit
+@part
 def _grow(q, p, weights, depths, residual, reach):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Let the indentation grow until Q(p) = q; return the p that the probe meets."""
     wanted = _virgin_residual(q, residual, reach)
@@ -126,7 +124,7 @@ def _grow(q, p, weights, depths, residual, reach):  # type: ignore[no-untyped-de
     return wanted
 
 
-@_jit
+@kernel
 def _step_into(centre, q, slope, force, ledger, depths, work, constants) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Take one step; see `IndentationState.step`."""
     weights, mean, along = work

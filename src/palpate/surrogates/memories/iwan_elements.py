@@ -32,19 +32,18 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
+from palpate.kernels import kernel, part
 from palpate.surrogates.memories.memory import Amplitude, Carry, Memory, MemoryState, register_memory
 
 __all__ = ["IwanElements", "IwanMemento", "IwanState", "advance", "free_step"]
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 _HALVINGS = 80  # halvings in the search for the free state, to the last bit of any bracket
 
 
-@_jit
+@part
 def _after(e, alpha, dh, dt, y, c, tau):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Elongation and slip of one element after an even step."""
     if tau < math.inf:
@@ -59,7 +58,7 @@ def _after(e, alpha, dh, dt, y, c, tau):  # type: ignore[no-untyped-def]  # noqa
     return (trial - slip if trial > 0.0 else trial + slip), slip
 
 
-@_jit
+@part
 def _lost(e, alpha, slip, dh, dt, k, y, c, tau):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Energy that one element turns into heat during an even step, J; never negative."""
     if tau < math.inf:
@@ -76,7 +75,7 @@ def _lost(e, alpha, slip, dh, dt, k, y, c, tau):  # type: ignore[no-untyped-def]
     return k * slip * (y + c * (alpha + 0.5 * slip))
 
 
-@_jit
+@part
 def _pull_after(dh, dt, e, alpha, k, y, c, tau) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Σ k e, N, after an even step that is not taken."""
     pull = 0.0
@@ -85,7 +84,7 @@ def _pull_after(dh, dt, e, alpha, k, y, c, tau) -> float:  # type: ignore[no-unt
     return float(pull)
 
 
-@_jit
+@kernel
 def advance(dh, dt, e, alpha, ledger, k, y, c, tau) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Take an even step; returns Σ k e, N. The ledger has stored, lost, work and lost in this step, J."""
     before, stored, lost, pull = ledger[0], 0.0, 0.0, 0.0
@@ -102,7 +101,7 @@ def advance(dh, dt, e, alpha, ledger, k, y, c, tau) -> float:  # type: ignore[no
     return float(pull)
 
 
-@_jit
+@kernel
 def free_step(dt, e, alpha, k, y, c, tau) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Change of h, m, after which nothing pulls: the force grows with h, so halving an interval finds it."""
     reach = 0.0
@@ -127,7 +126,7 @@ def free_step(dt, e, alpha, k, y, c, tau) -> float:  # type: ignore[no-untyped-d
     return float(0.5 * (low + high))
 
 
-@_jit
+@kernel(allocates=True)
 def _follow(stretch, steps, k, y, c, tau) -> np.ndarray:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Elongations (N, n) along a history."""
     e, alpha, out = np.zeros(k.size), np.zeros(k.size), np.zeros((stretch.size, k.size))

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from palpate.kernels import kernel, part
 
 __all__ = ["advance", "answer", "beta_of", "pattern_into", "step_into", "width_into"]
 
@@ -22,10 +22,8 @@ SUBSTEP = 0.1  # longest step over the shortest relaxation time; recovery is int
 MOST = 64  # substeps of a step, at most
 BEFORE, AFTER, BOTH = 0, 1, 2  # rows of `keeps`
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
-
-@_jit
+@part
 def width_into(q, law, width) -> None:
     """w in m and d ln w/d ln q into width (2,), with `law` = (w₁, √(2U₁), w₀)."""
     grown = law[0] * law[0]
@@ -36,7 +34,7 @@ def width_into(q, law, width) -> None:
     width[1] = grown / (3.0 * whole) if law[1] > 0.0 else 0.0
 
 
-@_jit
+@part
 def _reach(j, points, centre, width):
     """|x_j − c|²/2w²."""
     d = 0.0
@@ -45,7 +43,7 @@ def _reach(j, points, centre, width):
     return d / (2.0 * width * width)
 
 
-@_jit
+@part
 def pattern_into(centre, points, width, e, mean) -> None:
     """e_j = √σ_j into e (M,); Σ σ_j x_j, m, and Σ σ_j |x_j − c|²/2w² into mean (4,)."""
     least = math.inf
@@ -68,7 +66,7 @@ def pattern_into(centre, points, width, e, mean) -> None:
         e[j] *= scale
 
 
-@_jit
+@part
 def beta_of(q: float, pad: float) -> float:
     """β at q = √(2U), with `pad` = √(2U_a)."""
     if pad <= 0.0:
@@ -78,7 +76,7 @@ def beta_of(q: float, pad: float) -> float:
     return math.sqrt(ratio / (1.0 + ratio))
 
 
-@_jit
+@part
 def _mean(j, Z, shares):
     """Y_j = Σ γ_i z_ij."""
     y = 0.0
@@ -87,7 +85,7 @@ def _mean(j, Z, shares):
     return y
 
 
-@_jit
+@part
 def _stored(j, asked, beta, Z, shares):
     """Energy of one patch, J: ½(φ − βY)₊² + ½Σγz² − ½Y²."""
     y, squares = 0.0, 0.0
@@ -98,7 +96,7 @@ def _stored(j, asked, beta, Z, shares):
     return 0.5 * (press * press + squares - y * y)
 
 
-@_jit
+@part
 def _hold(j, asked, beta, Z, shares, keep, weight) -> None:
     """Let one patch relax under a probe that stays: p is the least of energy plus dissipation."""
     pull = 0.0
@@ -113,7 +111,7 @@ def _hold(j, asked, beta, Z, shares, keep, weight) -> None:
         Z[j, i] = shape + keep[i] * (Z[j, i] - shape)
 
 
-@_jit
+@part
 def _weight(shares, keep):
     """γ_∞ + Σ γ_i k_i."""
     weight = 1.0
@@ -122,7 +120,7 @@ def _weight(shares, keep):
     return weight
 
 
-@_jit
+@part
 def _recover(j, Z, shares, keep, weight, awake):
     """A hold of a patch that the probe doesn't reach; returns what is stored."""
     _hold(j, 0.0, 1.0, Z, shares, keep, weight)
@@ -136,7 +134,7 @@ def _recover(j, Z, shares, keep, weight, awake):
     return _stored(j, 0.0, 1.0, Z, shares)
 
 
-@_jit
+@part
 def advance(phi, beta, asked, q, part, beta_next, Z, shares, keeps, awake, ledger) -> None:
     """Hold, move phi a part of the way to q·asked at once, hold; the ledger gets stored, lost and work, J."""
     weights = (_weight(shares, keeps[BEFORE]), _weight(shares, keeps[AFTER]), _weight(shares, keeps[BOTH]))
@@ -170,7 +168,7 @@ def advance(phi, beta, asked, q, part, beta_next, Z, shares, keeps, awake, ledge
     ledger[3] += lost
 
 
-@_jit
+@part
 def _keeps(dt, times, keeps) -> None:
     """e/a, a and e of each branch: so that an even press is exact."""
     for i in range(times.size):
@@ -180,7 +178,7 @@ def _keeps(dt, times, keeps) -> None:
         keeps[BOTH, i] = math.exp(-x)
 
 
-@_jit
+@part
 def answer(centre, q, slope, phi, Z, work, constants, force) -> None:
     """F = −∂V/∂c into force (3,), N, for the patterns in `work`."""
     e, mean, width, _ = work
@@ -206,7 +204,7 @@ def answer(centre, q, slope, phi, Z, work, constants, force) -> None:
         force[a] -= along * slope[a]
 
 
-@_jit
+@part
 def _parts(dt, times) -> int:
     parts = 1
     for i in range(times.size):
@@ -214,7 +212,7 @@ def _parts(dt, times) -> int:
     return parts
 
 
-@_jit
+@kernel
 def step_into(centre, q, slope, dt, force, ledger, state, work, constants) -> bool:
     """Take one step; see `RelaxationState.step`. Time that isn't positive is an instant."""
     phi, Z, awake, last = state

@@ -24,19 +24,19 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from palpate.kernels import kernel, part
 
 __all__ = ["distance_into", "distances_into"]
 
 FAR = 1e6  # cells beyond the box, after which nothing changes: sums stay exact to 1e-10
 
 # fastmath stays off: the same bits on every machine
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 _Four = tuple[float, float, float, float]
 _Six = tuple[float, float, float, float, float, float]
 
 
-@_jit
+@part
 def _weights(u: float, nodes: int) -> tuple[int, _Four, _Four, _Four]:
     """Return the first node of four, their weights, and the weights' first and second derivatives by u."""
     t = min(max(u, 1.0), nodes - 2.0)
@@ -53,7 +53,7 @@ def _weights(u: float, nodes: int) -> tuple[int, _Four, _Four, _Four]:
     return i - 1, b, p, (0.0, 0.0, 0.0, 0.0)
 
 
-@_jit
+@part
 def _of_two(u: float, v: float, table: np.ndarray) -> _Six:
     """Return the spline of two variables, its first derivatives and its second ones (uu, vv, uv), in cells."""
     i, bu, pu, qu = _weights(u, table.shape[0])
@@ -72,7 +72,7 @@ def _of_two(u: float, v: float, table: np.ndarray) -> _Six:
     return f, fu, fv, fuu, fvv, fuv
 
 
-@_jit
+@part
 def _flat_distance_into(
     c: np.ndarray,
     gradient: np.ndarray,
@@ -105,7 +105,7 @@ def _flat_distance_into(
     return d
 
 
-@_jit
+@part
 def distance_into(
     c: np.ndarray,
     gradient: np.ndarray,
@@ -172,7 +172,7 @@ def distance_into(
     return d
 
 
-@_jit
+@kernel
 def distances_into(
     places: np.ndarray,
     distances: np.ndarray,

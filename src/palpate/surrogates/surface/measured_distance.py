@@ -41,8 +41,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
+from palpate.kernels import kernel, part
 from palpate.surrogates.surface.curved_patches import SHARP, SMOOTH, Patches, patches_of
 from palpate.surrogates.surface.nearest_triangle import DEEP, disc_tree, nearest_into
 from palpate.surrogates.surface.oriented_mesh import OrientedMesh
@@ -55,8 +55,6 @@ TURN = 2.0  # distance over the radius, in which d turns back behind the surface
 START, FINISH = 0.5, 0.85  # distances over the radius, where the bridge below the border begins and ends
 # cosine between distance and normal, below which small triangles are too coarse for the normal
 RESOLVED = 0.98
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,20 +118,20 @@ class MeasuredDistance:
         return distances, kinds
 
 
-@_jit
+@part
 def _step(t: float) -> float:
     """σ: from 0 at 0 to 1 at 1, with two vanishing derivatives at both."""
     t = min(max(t, 0.0), 1.0)
     return t * t * t * (10.0 + t * (6.0 * t - 15.0))
 
 
-@_jit
+@part
 def _bridge(r: float) -> float:
     """w, of a distance in radii."""
     return _step((r - START) / (FINISH - START))
 
 
-@_jit
+@part
 def _lifted_into(corners: np.ndarray, normals: np.ndarray, weights: np.ndarray, v: np.ndarray) -> float:
     """Put the normal at the contact point into v (3,); the height of the curved surface above it."""
     height = 0.0
@@ -153,7 +151,7 @@ def _lifted_into(corners: np.ndarray, normals: np.ndarray, weights: np.ndarray, 
     return height
 
 
-@_jit
+@part
 def _to_border(c: np.ndarray, border: np.ndarray) -> float:
     """Square of the distance of a point to straight parts of the border."""
     best = np.inf
@@ -172,7 +170,7 @@ def _to_border(c: np.ndarray, border: np.ndarray) -> float:
     return best
 
 
-@_jit
+@part
 def _beyond(height: float, r: float, radius: float) -> tuple[float, int]:
     """Distance where the nearest point is on the border, at a height over its tangent plane."""
     if height >= 0 or r == 0.0:
@@ -182,7 +180,7 @@ def _beyond(height: float, r: float, radius: float) -> tuple[float, int]:
     return height + G * (r - height), BRIDGED if G < 1 else ROUNDED
 
 
-@_jit
+@part
 def _rolled(height: float, r: float, shoulder: float, radius: float) -> tuple[float, int]:
     """Distance to the shoulder where the nearest point is on the border."""
     start = shoulder / 2.0
@@ -192,7 +190,7 @@ def _rolled(height: float, r: float, shoulder: float, radius: float) -> tuple[fl
     return np.sqrt(b * b + (height + shoulder) ** 2) - shoulder, ROLLED
 
 
-@_jit
+@part
 def _within(d: float, square: float, radius: float) -> tuple[float, int]:
     """Distance where the nearest point is inside the surface, d away; the border is √square away from that point."""
     if d > -START * radius or square >= radius * radius:
@@ -201,7 +199,7 @@ def _within(d: float, square: float, radius: float) -> tuple[float, int]:
     return d - 2.0 * d * G, BRIDGED
 
 
-@_jit
+@part
 def _over(
     c: np.ndarray, weights: np.ndarray, corners: np.ndarray, outward: np.ndarray, height: float
 ) -> float:
@@ -216,13 +214,13 @@ def _over(
     return float(product / np.sqrt(facing))
 
 
-@_jit
+@part
 def _turned(d: float, r: float, behind: float, end: float) -> float:
     """Distance where the nearest point is farther away than `behind`, on the inner side."""
     return d + (end - d) * _step((r - behind) / (end - behind))
 
 
-@_jit
+@kernel(allocates=True)
 def _measure_into(
     places: np.ndarray,
     distances: np.ndarray,
@@ -273,7 +271,7 @@ def _measure_into(
             distances[k], kinds[k] = _turned(distances[k], r, behind, end), BEHIND
 
 
-@_jit
+@part
 def _about_border(
     inside: bool, height: float, r: float, square: float, radius: float, shoulder: float
 ) -> tuple[float, int]:
@@ -285,7 +283,7 @@ def _about_border(
     return _beyond(height, r, radius)
 
 
-@_jit
+@kernel(allocates=True)
 def _outline_into(
     places: np.ndarray,
     distances: np.ndarray,
@@ -305,7 +303,7 @@ def _outline_into(
         distances[k] = np.sqrt(_to_border(c, border))
 
 
-@_jit
+@kernel(allocates=True)
 def _profile_into(
     a: np.ndarray,
     z: np.ndarray,

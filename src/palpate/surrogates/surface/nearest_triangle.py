@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from palpate.kernels import part
 
 __all__ = ["DEEP", "disc_tree", "nearest_into"]
 
 LEAF = 2  # triangles in each smallest disc, at most
 ROUNDING = 1e-9  # share by which discs are larger than they need be
 DEEP = 64  # discs that can wait at a time: two for each level of the tree
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 def disc_tree(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -68,7 +67,7 @@ def _discs(points: np.ndarray, areas: np.ndarray, starts: np.ndarray) -> np.ndar
     return np.column_stack([centres, normals, *sizes])
 
 
-@_jit
+@part
 def _apart(discs: np.ndarray, i: int, x: float, y: float, z: float, best: float) -> float:
     """Return the square of the distance of a point to disc i, or some square that is not below `best`."""
     x, y, z = x - discs[i, 0], y - discs[i, 1], z - discs[i, 2]
@@ -81,7 +80,7 @@ def _apart(discs: np.ndarray, i: int, x: float, y: float, z: float, best: float)
     return float(square + across * across)
 
 
-@_jit
+@part
 def _edge(dx: float, dy: float, dz: float, ux: float, uy: float, uz: float) -> tuple[float, float]:
     """Share of the edge u, from 0 to 1, that is nearest to a point at d from its start; square of the distance."""
     t = min(max((dx * ux + dy * uy + dz * uz) / (ux * ux + uy * uy + uz * uz), 0.0), 1.0)
@@ -89,7 +88,7 @@ def _edge(dx: float, dy: float, dz: float, ux: float, uy: float, uz: float) -> t
     return t, dx * dx + dy * dy + dz * dz
 
 
-@_jit
+@part
 def _nearest_point_into(
     corners: np.ndarray, i: int, x: float, y: float, z: float, weights: np.ndarray
 ) -> tuple[float, int]:
@@ -126,7 +125,7 @@ def _nearest_point_into(
     return best, 4 + after if t == 1.0 else 1 + k
 
 
-@_jit
+@part
 def nearest_into(
     x: float,
     y: float,

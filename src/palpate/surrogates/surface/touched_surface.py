@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.kernels import for_rows
 from palpate.network.packing import pack, unpack, whole_multiples
 from palpate.surrogates.surface.distance_kernels import distances_into
 
@@ -187,7 +188,7 @@ class TouchedSurface:
         """Return d (N,) in m, its gradient (N, 3) and its Hessian (N, 3, 3) in 1/m at places C (N, 3) in m."""
         C = _places(C)
         d, g, H = np.empty(len(C)), np.empty((len(C), 3)), np.empty((len(C), 3, 3))
-        distances_into(C, d, g, H, *self.compiled())
+        for_rows(distances_into, len(C))(C, d, g, H, *self.compiled())
         return d, g, H
 
     def depth(self, C: np.ndarray, radius: float | np.ndarray) -> np.ndarray:

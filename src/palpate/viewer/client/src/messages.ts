@@ -100,6 +100,15 @@ export interface Hello {
   meta: Record<string, unknown>;
 }
 
+/** A body to look at, server to page. */
+export interface Shown {
+  protocol: number;
+  name: string;
+  fields: FieldInfo[];
+  steps: StepInfo[];
+  reach: number;
+}
+
 /** An event in plain words, server to page. */
 export interface Notice {
   what: string;
@@ -132,15 +141,6 @@ export interface Feel {
   felt: number;
   override: boolean;
   words: string;
-}
-
-/** A body to look at, server to page. */
-export interface Shown {
-  protocol: number;
-  name: string;
-  fields: FieldInfo[];
-  steps: StepInfo[];
-  reach: number;
 }
 
 /** The stage of the work on a part, server to page. */
@@ -203,6 +203,10 @@ export function isHello(message: { kind: string }): message is Hello & { kind: s
   return message.kind === "Hello";
 }
 
+export function isShown(message: { kind: string }): message is Shown & { kind: string } {
+  return message.kind === "Shown";
+}
+
 export function isNotice(message: { kind: string }): message is Notice & { kind: string } {
   return message.kind === "Notice";
 }
@@ -217,10 +221,6 @@ export function isReason(message: { kind: string }): message is Reason & { kind:
 
 export function isFeel(message: { kind: string }): message is Feel & { kind: string } {
   return message.kind === "Feel";
-}
-
-export function isShown(message: { kind: string }): message is Shown & { kind: string } {
-  return message.kind === "Shown";
 }
 
 export function isPartNews(message: { kind: string }): message is PartNews & { kind: string } {

@@ -107,12 +107,19 @@ def _feel(body) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _follow_streams() -> None:
-    """The sequential rule and its regressors."""
+    """A network of arrays, and one that follows a stream, with its noise and its refinement."""
     import palpate as pp
+    from palpate.learning.stream.learner import Learner
 
     rng = np.random.default_rng(0)
     X = rng.uniform(-1.0, 1.0, (60, 2))
-    pp.fit(X, np.sin(X[:, :1]), effort=0.02, workers=1)
+    Y = np.column_stack([np.sin(3 * X[:, 0]), X.prod(axis=1)])
+    pp.fit(X, Y, effort=0.02, workers=1)
+    ranges = tuple(pp.Range(name, -1.0, 1.0) for name in "ab")
+    for outputs in (1, 2):
+        learner = Learner(ranges, tuple(pp.Quantity(f"y{i}") for i in range(outputs)), settle=20)
+        for x, y in zip(X, Y[:, :outputs], strict=True):
+            learner.observe(x, y)
 
 
 HALVES = {"networks": networks, "surfaces": surfaces}

@@ -6,18 +6,8 @@ import json
 
 import pytest
 
-from few_solves import FEW_SOLVES
+from few_solves import BLOCK, FEW_SOLVES
 from palpate.dataset import Dataset
-
-BLOCK = """\
-name = "tiny"
-[body]
-kind = "block"
-size = ["40 mm", "30 mm", "20 mm"]
-element = "20 mm"
-material = { young = "9 kPa" }
-[interaction]
-"""
 
 
 @pytest.fixture

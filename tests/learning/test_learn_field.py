@@ -130,6 +130,7 @@ def test_masses_are_shares_of_the_area(face):
     np.testing.assert_allclose(mass[inner], 1 / 144, rtol=1e-12)  # one square of 12 × 12
 
 
+@pytest.mark.full
 def test_rigid_fields_whose_coefficients_are_affine_are_found_exactly(face):
     points, triangles, surface = face
     X, column = columns(8)

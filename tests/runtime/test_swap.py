@@ -191,6 +191,7 @@ def test_no_more_energy_than_sampling_leaks_and_blending_adds(name, pace):
     assert hand.work <= own + ledger.added + 1e-9
 
 
+@pytest.mark.full
 def test_what_blending_added_is_damped_as_the_hand_gets_it_back():
     """The rival: without the controller a hand that shakes on purpose has the added energy back, and more."""
 

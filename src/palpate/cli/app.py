@@ -78,6 +78,7 @@ AskToken = Annotated[
         help="Open the page only to who has its whole address. Without a token every user of this machine can open it.",
     ),
 ]
+StrictPort = Annotated[bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a web browser.")]
 
 STUDY = Path("study.toml")
@@ -252,9 +253,7 @@ def validate(
 def view(
     model: ModelFile,
     port: Port = None,
-    strict_port: Annotated[
-        bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")
-    ] = False,
+    strict_port: StrictPort = False,
     browser: Browser = True,
     token: AskToken = True,
     device: Device = "page",
@@ -280,9 +279,7 @@ def view(
 def show(
     file: Annotated[Path, typer.Argument(help="File (.vtu or .pvd) or dataset (.zarr) with solved bodies.")],
     port: Annotated[int, count_option("--port", least=0, most=65535, help="Port of the page.")] = 8080,
-    strict_port: Annotated[
-        bool, typer.Option("--strict-port", help="Stop with an error if the port is busy.")
-    ] = False,
+    strict_port: StrictPort = False,
     browser: Browser = True,
     token: AskToken = True,
 ) -> None:

@@ -19,7 +19,7 @@ from typing import Any, Self
 import numpy as np
 
 from palpate.kernels import FEW, is_ready
-from palpate.network import Network, Scaling
+from palpate.network import Network, Scaling, TrainedRegion
 from palpate.network.network_kernels import second_order_into
 from palpate.processes import end_with_input, helper_environment
 from palpate.runtime.blending import _mix, compile_blend
@@ -141,9 +141,11 @@ def _compile_loop() -> None:
 
 
 def _compile_body(body: Surrogate) -> None:
-    """Ask a body as the loop and the page do."""
-    touched = touchable(body)
-    touched.evaluator()
+    """Ask a body as learning, the loop and the page do, in this order."""
+    network = body.energy.network
+    network.predict(np.zeros((FEW + 1, len(network.inputs))))
+    TrainedRegion.of(np.random.default_rng(0).uniform(-1.0, 1.0, (20, len(network.inputs))))
+    touchable(body).evaluator()
     for field in body.fields.values():
         if isinstance(field, FieldSurrogate):
             field.surface.at(np.zeros((FEW + 1, 3)))

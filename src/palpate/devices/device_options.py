@@ -17,7 +17,7 @@ _Settings = TypeVar("_Settings")
 
 @dataclass(frozen=True)
 class _Allowed:
-    """What an option may be."""
+    """The values that an option may have, and their words."""
 
     holds: Callable[[Any], bool]
     words: str

@@ -37,6 +37,8 @@ def networks() -> None:
     import bent
     import exported_bodies
     from models import spring_beam
+    from palpate.runtime.blending import compile_blend
+    from palpate.runtime.timing_test import measure_timing
 
     for kind in ("gaussian", "inverse-multiquadric", "matern-5/2"):
         inputs = exported_bodies.body("pad").inputs[:3]
@@ -48,6 +50,8 @@ def networks() -> None:
     for body in (spring_beam(), bent.body(), bent.body(bent.CREEPS)):
         _feel(body)
     _follow_streams()
+    measure_timing(0.01)
+    compile_blend()
 
 
 def surfaces() -> None:
@@ -125,5 +129,8 @@ def _follow_streams() -> None:
 HALVES = {"networks": networks, "surfaces": surfaces}
 
 if __name__ == "__main__":
+    from palpate import kernels
+
+    kernels.FEW = kernels.MANY = 0  # compiled, however few rows are asked for
     sys.path.insert(0, str(Path(__file__).parent))
     HALVES[sys.argv[1]]()

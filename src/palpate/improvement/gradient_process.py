@@ -37,10 +37,8 @@ SHORTEST, LONGEST = 0.15, 6.0  # lengths, in scaled inputs: half of a range is 1
 QUIETEST, NOISIEST = 3e-4, 0.3  # τ
 BEGIN_LENGTH, BEGIN_NOISE = 1.0, 0.01
 SEARCHED = 60  # observations from which lengths are searched: more cost time and move them little
-FIRST_STEPS, FURTHER_STEPS = (
-    60,
-    16,
-)  # evaluations of the likelihood, of a new process and from the last lengths
+# evaluations of the likelihood: of a new process, and from the last lengths
+FIRST_STEPS, FURTHER_STEPS = 60, 16
 _SPREAD = 0.4  # of the search's simplex, in logarithms
 _MIXED = 1e-9  # entry of a map that mixes two inputs
 

@@ -48,8 +48,8 @@ def test_solves_are_chosen_until_the_error_is_kept(palpate, study, tmp_path):
     ("options", "answer"),
     [
         (("--until", "two"), "'two' is no number"),
-        (("--until", "2"), "no force error"),
-        (("--until", "200%"), "no force error"),
+        (("--until", "2"), "out of range"),
+        (("--until", "200%"), "out of range"),
         (("--minutes", "3"), "Give --until"),
     ],
 )

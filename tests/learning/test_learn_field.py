@@ -376,8 +376,8 @@ def test_what_cannot_be_learnt_is_refused(face):
     known = {"points": points, "triangles": triangles, "surface": surface, "radius": RADIUS, "inputs": BOX}
     values = np.zeros((9, len(points), 3))
     for more, words in (
-        ({"amplitude": "cube"}, "grow"),
-        ({"seconds": 0}, "no learning"),
+        ({"amplitude": "cube"}, "option amplitude"),
+        ({"seconds": 0}, "option seconds"),
         ({"triangles": triangles[:0]}, "area"),
     ):
         with pytest.raises(UsageError, match=words):

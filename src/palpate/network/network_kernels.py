@@ -268,7 +268,7 @@ def point_into(x, y, work, steps, layout, scales, units, rows, modes, constants)
 @kernel
 def value_into(x, y, work, steps, layout, scales, units, rows, modes, constants) -> bool:
     """Evaluate one point x (n,) into y (m,); False, and nothing done, where x has another size than n."""
-    return point_into(x, y, work, steps, layout, scales, units, rows, modes, constants)
+    return point_into(x, y, work, steps, layout, scales, units, rows, modes, constants)  # type: ignore[no-any-return]
 
 
 @kernel

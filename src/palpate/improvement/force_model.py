@@ -21,8 +21,8 @@ from palpate.improvement.gradient_process import (
     fit_process,
     no_symmetry,
 )
-from palpate.learning.energy import EnergySamples
 from palpate.learning.energy.energy_images import images_of
+from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.rbf.symmetric_units import Images
 from palpate.surrogates import Baseline, Solves
 from palpate.units import Range, bounds

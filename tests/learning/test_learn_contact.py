@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from palpate.errors import UsageError
-from palpate.learning.energy import EnergySamples, learn_energy
+from palpate.learning.energy import learn_energy
 from palpate.learning.energy.energy_images import images_of
 from palpate.learning.energy.energy_problem import EnergyProblem
+from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.learning.energy.energy_search import best_mean, score
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.search import Candidate, Search

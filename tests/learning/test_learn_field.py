@@ -10,13 +10,12 @@ import pytest
 from palpate.errors import UsageError
 from palpate.learning.fields import (
     Snapshots,
-    SurfaceModes,
     learn_displacement,
     learn_field,
     learn_snapshots,
     lumped_mass,
 )
-from palpate.learning.fields.decompose_field import left_out
+from palpate.learning.fields.decompose_field import SurfaceModes, left_out
 from palpate.learning.fields.fit_local_mode import (
     border_widths,
     by_conjugate_gradients,

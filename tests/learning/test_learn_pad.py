@@ -7,7 +7,8 @@ import pytest
 
 from held import INPUTS, SQUARE, drawn, held
 from palpate.errors import UsageError
-from palpate.learning.energy import EnergySamples, learn_energy
+from palpate.learning.energy import learn_energy
+from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.learning.pad_fit import fit_pad
 from palpate.surrogates import PadBaseline, RestStiffness, Solves, Stiffening, Surrogate
 from palpate.surrogates.baselines.stiffening import exponents, powers

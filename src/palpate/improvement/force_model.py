@@ -15,17 +15,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.improvement.gradient_process import GradientProcess, Observations, fit_process, no_symmetry
-from palpate.learning.energy import EnergySamples
+from palpate.improvement.gradient_process import (
+    GradientProcess,
+    Observations,
+    fit_process,
+    no_symmetry,
+)
 from palpate.learning.energy.energy_images import images_of
+from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.rbf.symmetric_units import Images
 from palpate.surrogates import Baseline, Solves
 from palpate.units import Range, bounds
 
 __all__ = ["ForceModel"]
 
-LIGHT = 0.05  # f₀ over the largest force
-_CLIP = 30.0  # largest |ℓ|: far from data an exponential must not overflow
+LIGHT = 0.05  # of the largest force: f₀
+_CLIP = 30.0  # of ℓ: far from data an exponential must not overflow
 
 
 @dataclass(frozen=True, eq=False)

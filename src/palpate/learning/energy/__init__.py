@@ -9,7 +9,6 @@ energy_export    the parts of an energy from what was found
 learn_energy     all of it, with the choice of a baseline
 """
 
-from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.learning.energy.learn_energy import EnergyHistory, learn_energy
 
-__all__ = ["EnergyHistory", "EnergySamples", "learn_energy"]
+__all__ = ["EnergyHistory", "learn_energy"]

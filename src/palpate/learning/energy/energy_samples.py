@@ -33,46 +33,22 @@ CURVATURE_SHARE = 0.1  # of a stiffness row's weight: its error level is about t
 
 @dataclass(frozen=True, eq=False)
 class EnergySamples:
-    """Solves that tell of an energy, N of them, k of their n inputs felt.
+    """Solves that tell of an energy, N of them, k of their n inputs felt."""
 
-    Attributes
-    ----------
-    X : (N, n)
-        Felt coordinates (m), then further inputs.
-    energy : (N,)
-        E = U + offset > 0, J; zero for a body at rest whose stiffness is known.
-    force : (N, n)
-        −∂U by the inputs: on the hand, N, then by the further inputs; not-a-number where it is not known.
-    stiffness : (N, n, n)
-        Its derivative by the inputs, symmetric; not-a-number where it is not known.
-    depth : (N,)
-        The baseline's own coordinate, m.
-    groups : (N,) int
-        Solves of one number tell of each other.
-    inputs : n ranges
-        Names, units and trained ranges.
-    felt : int
-        k.
-    """
-
-    X: np.ndarray
-    energy: np.ndarray
+    X: np.ndarray  # (N, n), felt coordinates, m, then further inputs
+    energy: np.ndarray  # (N,), E = U + offset > 0, J; zero for a body at rest whose stiffness is known
+    # (N, n), −∂U by the inputs: on the hand, N, then by further ones; not-a-number where it is not known
     force: np.ndarray
+    # (N, n, n), derivative of the force by the inputs, symmetric; not-a-number where it is not known
     stiffness: np.ndarray
-    depth: np.ndarray
-    groups: np.ndarray
-    inputs: tuple[Range, ...]
-    felt: int
+    depth: np.ndarray  # (N,), the baseline's own coordinate, m
+    groups: np.ndarray  # (N,), solves of one number tell of each other
+    inputs: tuple[Range, ...]  # names, units and trained ranges
+    felt: int  # k
 
     @classmethod
     def of(cls, solves: Solves, baseline: Baseline) -> EnergySamples:
-        """Return all solves that tell something: those without contact have no energy, whatever is learnt.
-
-        Raises
-        ------
-        UsageError
-            If shapes disagree, no solve has contact, or one that has stored no energy.
-        """
+        """Return all solves that tell something: those without contact have no energy, whatever is learnt."""
         inputs, k = tuple(solves.inputs), len(baseline.directions)
         n = len(inputs)
         X = numbers("Inputs X", solves.X, (None, n))
@@ -131,15 +107,7 @@ class EnergySamples:
         return value[:, None], np.nan_to_num(slopes)[:, None], np.nan_to_num(bends[:, i, j])[:, None]
 
     def rows(self, baseline: Baseline, *, curvature_share: float = CURVATURE_SHARE) -> dict[str, np.ndarray]:
-        """Return what `refine` takes besides X: targets, and their natural weights.
-
-        Parameters
-        ----------
-        baseline : Baseline
-            U₀, from which ℓ is counted.
-        curvature_share : float
-            Weight of a stiffness beside a force.
-        """
+        """Return what `refine` takes besides X: targets and natural weights; a stiffness has a share of a force's."""
         Y, slopes, curvatures = self.targets(baseline)
         half, n, k = self.half, len(self.inputs), self.felt
         i, j = pairs(n)

@@ -10,14 +10,13 @@
     search           the same by a few units that move; which of both is decided by solves left out
 """
 
-from palpate.learning.fields.decompose_field import SurfaceModes, lumped_mass
+from palpate.learning.fields.decompose_field import lumped_mass
 from palpate.learning.fields.learn_field import LearntField, learn_displacement, learn_field, learn_snapshots
 from palpate.learning.fields.snapshots import Snapshots
 
 __all__ = [
     "LearntField",
     "Snapshots",
-    "SurfaceModes",
     "learn_displacement",
     "learn_field",
     "learn_snapshots",

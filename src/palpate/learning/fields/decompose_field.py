@@ -61,18 +61,10 @@ def lumped_mass(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceModes:
-    """Modes of N snapshots.
+    """Modes of N snapshots."""
 
-    Attributes
-    ----------
-    modes : (k, nodes, components)
-        φ, the largest first; zero at nodes that stand for no surface.
-    sizes : (k,)
-        σ_k/√N: root mean square of the coefficients, in the field's unit.
-    """
-
-    modes: np.ndarray
-    sizes: np.ndarray
+    modes: np.ndarray  # (k, nodes, components), φ, the largest first; zero at nodes that stand for no surface
+    sizes: np.ndarray  # (k,), σ_k/√N: root mean square of the coefficients, in the field's unit
 
     @classmethod
     def of(cls, values: np.ndarray, mass: np.ndarray) -> SurfaceModes:
@@ -85,13 +77,7 @@ class SurfaceModes:
         return cls(modes, sizes / np.sqrt(N))
 
     def count(self, tolerance: float) -> int:
-        """Fewest modes that miss at most the tolerance of the snapshots; one at least.
-
-        Parameters
-        ----------
-        tolerance : float
-            Root mean square over surface and snapshots, in the field's unit.
-        """
+        """Fewest modes, one at least, that miss at most a root mean square of the snapshots, in the field's unit."""
         return int(np.clip((self.missed > tolerance).sum(), 1, max(len(self.sizes), 1)))
 
     @property

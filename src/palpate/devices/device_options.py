@@ -17,10 +17,10 @@ _Settings = TypeVar("_Settings")
 
 @dataclass(frozen=True)
 class _Allowed:
-    """The values that an option may have."""
+    """The values that an option may have, and their words."""
 
-    holds: Callable[[Any], bool]  # whether a value is one of them
-    words: str  # for the message that refuses others
+    holds: Callable[[Any], bool]
+    words: str
 
 
 def number(

@@ -178,6 +178,8 @@ class Sensed:
         The most that the hand had put in, and what it was given on balance, J.
     felt : float
         The largest stiffness that the hand feels, N/m.
+    faults : int
+        Ticks with a fault.
     """
 
     change: float
@@ -185,6 +187,7 @@ class Sensed:
     stored: float
     given: float
     felt: float
+    faults: int
 
     @classmethod
     def of(
@@ -212,16 +215,17 @@ class Sensed:
             control=controlled,
         )
         inwards, reach = np.array([settings.x, settings.y, settings.z]), 0.1 * settings.amplitude
-        before, change, air, lowest = np.zeros(3), 0.0, 0.0, 0.0
+        before, change, air, lowest, faults = np.zeros(3), 0.0, 0.0, 0.0, 0
         for k in range(round(seconds * rate)):
             loop.tick(k / rate)
+            faults += loop.fault is not Fault.NONE
             force = loop.out.force.copy()
             if k > rate:
                 change = max(change, float(np.linalg.norm(force - before)))
             if hand.place @ inwards < -reach:
                 air = max(air, float(np.linalg.norm(force)))
             before, lowest = force, min(lowest, hand.work)
-        return cls(change, air, -lowest, hand.work, loop.bounds.felt)
+        return cls(change, air, -lowest, hand.work, loop.bounds.felt, faults)
 
 
 def _sensed_row(name: str, body: Touchable, pace: tuple[float, float], *, quick: bool) -> dict[str, Any]:

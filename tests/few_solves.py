@@ -1,6 +1,17 @@
-"""The end of a study file that solves little: six places of a body of 40 × 30 × 20 mm, of few elements."""
+"""A study file that solves little: six places of a body of 40 × 30 × 20 mm, of few elements."""
 
 from __future__ import annotations
+
+BLOCK = """\
+name = "tiny"
+[body]
+kind = "block"
+size = ["40 mm", "30 mm", "20 mm"]
+element = "20 mm"
+material = { young = "9 kPa" }
+[interaction]
+"""
+"""Begins a study file, up to the table of the interaction."""
 
 FEW_SOLVES = """
 radius = "8 mm"

@@ -37,6 +37,8 @@ def networks() -> None:
     import bent
     import exported_bodies
     from models import spring_beam
+    from palpate.runtime.blending import compile_blend
+    from palpate.runtime.timing_test import measure_timing
 
     for kind in ("gaussian", "inverse-multiquadric", "matern-5/2"):
         inputs = exported_bodies.body("pad").inputs[:3]
@@ -48,6 +50,8 @@ def networks() -> None:
     for body in (spring_beam(), bent.body(), bent.body(bent.CREEPS)):
         _feel(body)
     _follow_streams()
+    measure_timing(0.01)
+    compile_blend()
 
 
 def surfaces() -> None:
@@ -107,16 +111,26 @@ def _feel(body) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _follow_streams() -> None:
-    """The sequential rule and its regressors."""
+    """A network of arrays, and one that follows a stream, with its noise and its refinement."""
     import palpate as pp
+    from palpate.learning.stream.learner import Learner
 
     rng = np.random.default_rng(0)
     X = rng.uniform(-1.0, 1.0, (60, 2))
-    pp.fit(X, np.sin(X[:, :1]), effort=0.02, workers=1)
+    Y = np.column_stack([np.sin(3 * X[:, 0]), X.prod(axis=1)])
+    pp.fit(X, Y, effort=0.02, workers=1)
+    ranges = tuple(pp.Range(name, -1.0, 1.0) for name in "ab")
+    for outputs in (1, 2):
+        learner = Learner(ranges, tuple(pp.Quantity(f"y{i}") for i in range(outputs)), settle=20)
+        for x, y in zip(X, Y[:, :outputs], strict=True):
+            learner.observe(x, y)
 
 
 HALVES = {"networks": networks, "surfaces": surfaces}
 
 if __name__ == "__main__":
+    from palpate import kernels
+
+    kernels.FEW = kernels.MANY = 0  # compiled, however few rows are asked for
     sys.path.insert(0, str(Path(__file__).parent))
     HALVES[sys.argv[1]]()

@@ -161,6 +161,7 @@ def test_networks_of_arrays_answer_too(palpate, fitted):
     assert palpate("ask", path, "--at", "1,2,3").code == 2
 
 
+@pytest.mark.full
 def test_a_network_alone_knows_its_ranges_and_no_deviation(palpate, fitted, tmp_path):
     net = fitted[0].network
     path = replace(net, extras={}, meta={}).save(tmp_path / "net.palpate")

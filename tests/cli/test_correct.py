@@ -206,7 +206,7 @@ def test_what_can_not_be_is_refused_with_its_reason(palpate, folder):
         (("--stdin", "--port", "0"), "one source"),
         (("--file", folder / "none.csv"), "can't be read"),
         (("--file", folder / "bad.csv"), "line 2: Column 4 (Fz) holds 'four'"),
-        (("--file", folder / "bad.csv", "--noise", "0"), "no noise of a force sensor"),
+        (("--file", folder / "bad.csv", "--noise", "0"), "--noise: 0 is out of range"),
     ):
         answer = palpate("correct", model_, "--out", out, *words)
         assert answer.code == 2

@@ -49,29 +49,3 @@ def test_the_rod_keeps_its_limits_and_leaves_everything_behind(palpate, tmp_path
     page = (tmp_path / "beam-plastic-quick.html").read_text(encoding="utf-8")
     for heading in ("Force against displacement", "Energy stored and lost", "Histories"):
         assert page.count(f">{heading}<") == 1
-
-
-@pytest.mark.full
-def test_a_body_with_memory_has_a_study_file(palpate, tmp_path: Path):
-    """The stages one by one, from a file, on few histories of a coarse beam."""
-    file = tmp_path / "rod.toml"
-    assert palpate("init", file, "--preset", "beam-plastic").code == 0
-    few = {"elements = 20": "elements = 4", "fibres = 48": "fibres = 8", "histories = 10": "histories = 1"}
-    text = file.read_text(encoding="utf-8")
-    for old, new in {
-        **few,
-        "unseen = 14": "unseen = 1",
-        "p95 = 0.035": "p95 = 10.0",
-        "median = 0.01": "median = 10.0",
-    }.items():
-        assert old in text
-        text = text.replace(old, new)
-    file.write_text(text.replace("# tolerance = 1e-05", "tolerance = 1e-3"), encoding="utf-8")
-    for command in ("sweep", "learn", "validate"):
-        answer = palpate(command, file)
-        assert answer.code == 0, answer.err
-    assert "1 histories" in answer.out
-    alone = palpate("validate", tmp_path / "rod.palpate", "--no-report")  # by the histories beside it
-    assert "rod on" in alone.out
-    assert (tmp_path / "rod.html").exists()
-    assert load(tmp_path / "rod.palpate").meta["runtime"]["rate"] == 1000.0

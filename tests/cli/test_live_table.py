@@ -10,14 +10,13 @@ import pytest
 
 from models import spring_beam
 from palpate.cli.live_table import live_rows, live_table
-from palpate.cli.run_command import aim_device
 from palpate.cli.terminal_keys import RESUME, STOP, terminal_keys
 from palpate.devices.simulated import SimulatedHand
 from palpate.errors import UsageError
 from palpate.runtime.loop import Loop
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared
-from palpate.runtime.touchable import touchable
+from palpate.runtime.touchable import aim_device, touchable
 
 
 @pytest.fixture

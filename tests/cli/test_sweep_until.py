@@ -6,18 +6,8 @@ import json
 
 import pytest
 
-from few_solves import FEW_SOLVES
+from few_solves import BLOCK, FEW_SOLVES
 from palpate.dataset import Dataset
-
-BLOCK = """\
-name = "tiny"
-[body]
-kind = "block"
-size = ["40 mm", "30 mm", "20 mm"]
-element = "20 mm"
-material = { young = "9 kPa" }
-[interaction]
-"""
 
 
 @pytest.fixture
@@ -58,8 +48,8 @@ def test_solves_are_chosen_until_the_error_is_kept(palpate, study, tmp_path):
     ("options", "answer"),
     [
         (("--until", "two"), "'two' is no number"),
-        (("--until", "2"), "no force error"),
-        (("--until", "200%"), "no force error"),
+        (("--until", "2"), "out of range"),
+        (("--until", "200%"), "out of range"),
         (("--minutes", "3"), "Give --until"),
     ],
 )

@@ -88,7 +88,7 @@ def test_quantities_behind_options_are_read_as_they_are_written(palpate, asked, 
         (("--workers", "1_0"), "--workers: '1_0' is no whole number"),
         (("--workers", "1,5"), "--workers: '1,5' is no whole number"),
         (("--port", "99999"), "--port: 99999 is out of range"),
-        (("--until", "2"), "no force error"),
+        (("--until", "2"), "out of range"),
         (("--until", "2,5 %%"), "--until:"),
     ],
 )

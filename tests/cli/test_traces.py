@@ -64,6 +64,7 @@ def test_a_run_says_what_it_recorded_and_the_trace_knows_it(palpate, file, trace
     assert palpate("run", file, "--record", trace).code == UsageError.exit_code, "no recording is replaced"
 
 
+@pytest.mark.full
 def test_a_replay_says_that_it_is_the_same_or_by_how_much_it_is_not(palpate, trace, tmp_path):
     answer = palpate("replay", trace, "--json")
     assert json.loads(answer.out)["identical"], answer.out

@@ -137,7 +137,7 @@ class HaplyRig(Rig):
     """A Haply behind its service."""
 
     stopped, lost = "power supply", "04C2 is no longer there"  # words of these faults
-    wild = "starts at"
+    wild = "from its centre"
 
     def __init__(self, devices=("04C2",), inventory=None, **settings):
         super().__init__()
@@ -240,7 +240,7 @@ class CrtkRig(Rig):
     """An arm behind a ROS bridge, whose clock is an hour before the loop's."""
 
     stopped, lost = "it is paused", "ROS bridge"  # words of these faults
-    wild, final = "Hold it still", ("loss",)
+    wild, final = "from its centre", ("loss",)
 
     def __init__(self, **settings):
         super().__init__()
@@ -323,7 +323,7 @@ class ForceDimensionRig(Rig):
     """A device behind the double of Force Dimension's library."""
 
     stopped, lost = "has no power", "is no longer there"  # words of these faults
-    wild = "starts at"
+    wild = "from its centre"
 
     def __init__(self, library):
         super().__init__()
@@ -366,7 +366,7 @@ class OpenHapticsRig(Rig):
     """A device behind the double of the OpenHaptics library, whose frames come one by one."""
 
     stopped, lost = "too warm", "connection"  # words of these faults
-    wild, final = "starts", ("loss",)
+    wild, final = "from its centre", ("loss",)
 
     def __init__(self, library):
         super().__init__()

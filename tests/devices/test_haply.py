@@ -246,7 +246,7 @@ def test_a_device_may_be_plugged_in_while_it_is_looked_for(service, rig):
         ("calibrated", False, "not calibrated"),
         ("silent_http", True, "does not say how it scales forces"),
         ("deaf", True, "keeps the preset 'defaults'"),
-        ("position", (math.nan, 0.0, 0.0), "starts at"),
+        ("position", (math.nan, 0.0, 0.0), "from its centre"),
         ("closing", True, "closed the connection"),
     ],
 )

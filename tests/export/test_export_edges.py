@@ -50,7 +50,9 @@ def extremes(thing):
 
 def from_gcc(thing, folder):
     done = export_c(thing, folder, check=False)
-    return CheckProgram.compile(require_program("gcc"), done.sources, done.name, folder, options=STRICT)
+    return CheckProgram.compile(
+        require_program("gcc"), done.sources, done.name, folder, options=(*STRICT, "-O0")
+    )
 
 
 def from_wasm(thing, folder):

@@ -110,7 +110,7 @@ def host(tmp_path_factory):
     """The program that calls all functions, of the source that is in each FMU."""
     compiler, folder = require_program("gcc"), tmp_path_factory.mktemp("host")
     (folder / "palpate_fmu.c").write_text(fmu_source(), "utf-8")
-    command = [compiler, "-std=c99", "-Wall", "-Wextra", "-O1", "-g", "-fsanitize=address,undefined"]
+    command = [compiler, "-std=c99", "-Wall", "-Wextra", "-O0", "-fsanitize=address,undefined"]
     command += ["-fno-sanitize-recover=all", f"-I{folder}", f"-I{HERE}", str(HERE / "fmu_host.c")]
     subprocess.run([*command, "-o", str(folder / "host"), "-lm"], check=True, capture_output=True)
     return folder / "host"

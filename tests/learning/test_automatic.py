@@ -9,8 +9,9 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.learning import Settings, learn
-from palpate.learning.automatic import RUNGS, automatic, ranges_of, relative_error, spread_of
+from palpate.learning.learn import RUNGS, automatic, ranges_of
 from palpate.learning.scatter import noise_variance, spacing
+from palpate.rbf.sample_checks import relative_error, spread_of
 from palpate.units import Quantity
 
 TARGETS = (0.3, 0.03, 0.003)

@@ -101,6 +101,7 @@ def test_root_gives_the_coefficients_of_least_squares():
     np.testing.assert_allclose(both[3:], np.vstack([one.weights for one in two]) / 2, atol=1e-6)
 
 
+@pytest.mark.full
 def test_quantile_is_conformal_and_students_where_samples_are_few(found):
     network = found.network
     missed = np.random.default_rng(0).normal(size=(99, 2)) * [1.0, 7.0]

@@ -157,6 +157,7 @@ def test_images_of_a_field_are_fields_of_the_images(field):
         assert np.einsum("ij,ij->", a, np.cross(b - a, c - a)) / 6 == pytest.approx(0.06 * 0.06 * 0.03)
 
 
+@pytest.mark.full
 def test_what_a_dimple_leaves_is_carried_beside_the_touched_surface_as_it_is():
     """On another mesh: the whole field where nothing is touched, and the field less the local mode where it is."""
     body, probe = block()

@@ -130,6 +130,7 @@ def test_masses_are_shares_of_the_area(face):
     np.testing.assert_allclose(mass[inner], 1 / 144, rtol=1e-12)  # one square of 12 × 12
 
 
+@pytest.mark.full
 def test_rigid_fields_whose_coefficients_are_affine_are_found_exactly(face):
     points, triangles, surface = face
     X, column = columns(8)
@@ -375,8 +376,8 @@ def test_what_cannot_be_learnt_is_refused(face):
     known = {"points": points, "triangles": triangles, "surface": surface, "radius": RADIUS, "inputs": BOX}
     values = np.zeros((9, len(points), 3))
     for more, words in (
-        ({"amplitude": "cube"}, "grow"),
-        ({"seconds": 0}, "no learning"),
+        ({"amplitude": "cube"}, "option amplitude"),
+        ({"seconds": 0}, "option seconds"),
         ({"triangles": triangles[:0]}, "area"),
     ):
         with pytest.raises(UsageError, match=words):

@@ -164,7 +164,7 @@ def test_what_can_not_be_learnt_is_refused():
         fit_pad(solves(X, 0 * U, F, K))
     with pytest.raises(UsageError, match="too few"):
         fit_pad(solves(X[:3], U[:3], F[:3], K[:3]))
-    for changed, match in (({"seconds": 0.0}, "no learning"), ({"radial": "round"}, "no radial function")):
+    for changed, match in (({"seconds": 0.0}, "above 0"), ({"radial": "round"}, "option radial")):
         with pytest.raises(UsageError, match=match):
             learn_energy(
                 solves(X, U, F, K),

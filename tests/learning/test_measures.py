@@ -7,7 +7,7 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.learning.arrays.array_samples import ArrayProblem
-from palpate.learning.automatic import automatic, ranges_of
+from palpate.learning.learn import automatic, ranges_of
 from palpate.rbf.sample_checks import relative_error, spread_of
 from palpate.units import Quantity
 

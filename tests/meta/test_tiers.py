@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+import kernels
 
 ROOT = Path(__file__).parents[2]
 TESTS = ROOT / "tests"
@@ -40,12 +44,13 @@ def test_every_folder_has_tests_in_a_plain_run(folder: Path):
 
 # real parts, and the files that go through them in a plain run
 REAL_PARTS = {
+    "bodies of each kind": "cli/test_each_kind.py",
     "Zarr": "dataset/test_dataset.py",
     "workers": "sweeps/test_sweep.py",
     "websockets": "viewer/test_traffic.py",
     "Chromium": "viewer/test_page.py",
     "compiled C": "export/test_export_checklist.py",
-    "devices": "runtime/test_device_checklist.py",
+    "devices": "devices/test_device_checklist.py",
 }
 
 
@@ -75,3 +80,13 @@ def test_the_whole_check_runs_both_tiers():
     commands = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
     runs = [line.partition("||")[0].strip() for line in commands if line.startswith("python -m pytest")]
     assert runs == ["python -m pytest", "python -m pytest -m full"]
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("half", kernels.HALVES)
+def test_the_warm_up_calls_what_there_is(half: str):
+    """A whole run goes on without it, only slower."""
+    done = subprocess.run(
+        [sys.executable, kernels.__file__, half], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

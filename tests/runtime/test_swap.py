@@ -191,6 +191,7 @@ def test_no_more_energy_than_sampling_leaks_and_blending_adds(name, pace):
     assert hand.work <= own + ledger.added + 1e-9
 
 
+@pytest.mark.full
 def test_what_blending_added_is_damped_as_the_hand_gets_it_back():
     """The rival: without the controller a hand that shakes on purpose has the added energy back, and more."""
 
@@ -356,11 +357,15 @@ def test_elements_of_another_number_and_a_jump_are_refused():
     ("most", "new", "words"),
     [
         ("MAX_INPUTS", spring_beam, "inputs; the runtime carries 0"),
-        ("MAX_PLACES", lambda: pressed.surrogate(memory=YIELDS), "at 4 places; the runtime carries 0"),
+        (
+            "MAX_PLACES",
+            lambda: pressed.surrogate(memory=YIELDS),
+            "4 places with an indentation; the runtime carries 0",
+        ),
     ],
 )
 def test_a_surrogate_too_large_for_the_runtime_is_refused_by_what_is_too_large(most, new, words, monkeypatch):
-    monkeypatch.setattr(f"palpate.runtime.swap.{most}", 0)
+    monkeypatch.setattr(f"palpate.runtime.shared_state.{most}", 0)
     with pytest.raises(UsageError, match=words) as raised:
         swap_between(touchable(new()), touchable(new()))
     assert raised.value.why

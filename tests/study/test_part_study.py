@@ -253,8 +253,8 @@ def test_a_study_for_a_part_says_what_its_file_holds(folder):
             "body.material.poisson: 0.7 is out of range; allowed is at least 0 and less than 0.5",
         ),
         ({"touched": "front"}, "has no surface 'front'"),
-        ({"radius": -1e-3}, "The radius of the ball"),
-        ({"depth": 0.0}, "The depth of the ball"),
+        ({"radius": -1e-3}, "option radius"),
+        ({"depth": 0.0}, "option depth"),
     ],
 )
 def test_choices_that_do_not_suit_a_part_are_refused(folder, choice, words):

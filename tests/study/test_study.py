@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
-from palpate.learning import Refinement, hand_coordinates, learn_bent
+from palpate.learning import Refinement, hand_coordinates, learn_dataset
 from palpate.physics import Circle, Rectangle, Section
 from palpate.study import Study, preset_names, preset_study, read_study, to_toml
 from palpate.study.run import split_rows
@@ -124,7 +124,7 @@ def test_datasets_of_different_bodies_are_not_put_together(solved):
 @pytest.mark.full
 def test_networks_may_do_without_units(solved):
     _, grid, _, _ = solved
-    touch = learn_bent(grid, effort=0.1, refinement=Refinement(units_max=0)).surrogate
+    touch, _ = learn_dataset(grid, effort=0.1, refinement=Refinement(units_max=0))
     fields = {name: field.network.units for name, field in touch.fields.items() if name != "filter"}
     assert fields == {"nodes": 0, "displacement": 0}
 
@@ -133,21 +133,21 @@ def test_networks_may_do_without_units(solved):
 def test_too_few_solves_are_refused(solved):
     _, grid, _, _ = solved
     with pytest.raises(UsageError, match="too few"):
-        learn_bent(grid.take([0, 1, 2]))
+        learn_dataset(grid.take([0, 1, 2]))
 
 
 @pytest.mark.full
 def test_a_coupling_that_holds_nothing_is_refused(solved):
     _, _, _, sobol = solved
     with pytest.raises(UsageError, match="holds nothing"):
-        learn_bent(sobol, passes=1, refinement=Refinement(samples=0, units_max=1, starts=1), coupling=0.0)
+        learn_dataset(sobol, passes=1, refinement=Refinement(samples=0, units_max=1, starts=1), coupling=0.0)
 
 
 @pytest.mark.full
 def test_two_loads_get_a_coupling_and_the_answer_leads_back_to_the_hand(solved):
     _, _, _, sobol = solved
     few = Refinement(samples=0, units_max=8, target=1e-3, starts=1)
-    touch = learn_bent(sobol, passes=1, refinement=few, effort=0.2).surrogate
+    touch, _ = learn_dataset(sobol, passes=1, refinement=few, effort=0.2)
     compliance, field = touch.energy.baseline.compliance, touch.fields["displacement"]
     assert compliance > 0
     hand, directions = (
@@ -167,7 +167,7 @@ def test_random_loads_leave_no_dead_zone_at_the_first_touch(solved):
     _, _, two, sobol = solved
     few = Refinement(samples=0, units_max=8, target=1e-3, starts=1)
     away = sobol.take(np.flatnonzero(np.abs(sobol.X / [1.5, 5.0]).max(axis=1) > 0.3))
-    touch = learn_bent(away, passes=2, refinement=few, effort=0.1).surrogate
+    touch, _ = learn_dataset(away, passes=2, refinement=few, effort=0.1)
     field, solver = touch.fields["displacement"], two.problem().open()
     for load in ([0.0, 0.05], [0.015, -0.05]):
         u = solver.solve(np.array(load)).displacement[field.held, :2]

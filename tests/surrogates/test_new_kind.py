@@ -16,6 +16,7 @@ from surrogate_checks import CHECKS, Example
 import palpate as pp
 from palpate.surrogates import Compiled, Solves
 
+pytestmark = pytest.mark.full  # compiles kernels of its own
 MEETS = 0.030  # m, the height at which the punch meets the springs
 ENDS = ((-0.02, 0.02), (-0.02, 0.02), (0.022, MEETS))
 RANGES = tuple(pp.Range(f"c_{axis}", *ends, "m") for axis, ends in zip("xyz", ENDS, strict=True))

@@ -267,6 +267,7 @@ def test_solves_that_were_trained_on_are_no_test() -> None:
         validate(surrogate(region=TrainedRegion.of(scaled)), test)
 
 
+@pytest.mark.full
 def test_a_dataset_is_judged_like_its_arrays() -> None:
     test = solves()
     one, other = validate(surrogate(factor=1.02), test), validate(surrogate(factor=1.02), dataset(test))

@@ -441,20 +441,16 @@ def _serve(
     controller: bool = True,
     dead_man: bool = False,
 ) -> None:
-    from palpate.cli.run_command import aim_device
-    from palpate.runtime.touchable import load_touchable
+    from palpate.runtime.touchable import aim_device, load_touchable
     from palpate.runtime.warm_up import WarmUp
+    from palpate.viewer import serve
 
-    with WarmUp("loop") as warm_up:
-        words = f": {warm_up.words}" if warm_up.words else ""
-        # the loop's own process takes some seconds to start
-        Console().say(f"Opening the page of {model} …{words}")
-        from palpate.viewer import serve
-
-        body = load_touchable(model)
-        settings = body.meta.get("runtime", {})
+    body = load_touchable(model)
+    with WarmUp("loop", body=body) as warm_up:
+        Console().say(f"Opening the page of {model} … {warm_up.words}".rstrip())
         device = aim_device(device, body)
         warm_up.wait()
+    settings = body.meta.get("runtime", {})
     serve(
         model,
         port=settings.get("port", 8080) if port is None else port,

@@ -12,7 +12,8 @@ from palpate.cli.table_options import column_list
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning import fit
-from palpate.learning.automatic import ranges_of
+from palpate.learning.learn import ranges_of
+from palpate.options import FitOptions
 from palpate.output_files import require_outputs
 from palpate.tables import Table, read_table
 from palpate.units import Quantity, Range
@@ -37,12 +38,12 @@ def fit_table(
     *,
     reading: Mapping[str, Any],
     force: bool = False,
-    **search: Any,
+    options: FitOptions,
 ) -> None:
     """Learn a network from a table and write it; a summary goes to stdout.
 
-    The model is by default the table's name with the ending .palpate; `force` replaces a file that exists. `reading` is
-    how the table is written, as `palpate.tables.read_table` takes it; `search` are options of `palpate.fit`.
+    A file for the model that is left out has the table's name with the ending .palpate; `reading` is how the table is
+    written, as `palpate.tables.read_table` takes it.
     """
     out = path.with_suffix(".palpate") if out is None else out
     if out.exists() and not force:
@@ -67,7 +68,12 @@ def fit_table(
     ranges = [Range(r.name, r.low, r.high, table.si_unit(r.name)) for r in ranges_of(X, inputs)]
     quantities = [Quantity(name, table.si_unit(name)) for name in outputs]
     model = fit(
-        X, Y[:, 0] if len(outputs) == 1 else Y, ranges, quantities, lines=table.lines[rows].tolist(), **search
+        X,
+        Y[:, 0] if len(outputs) == 1 else Y,
+        ranges,
+        quantities,
+        lines=table.lines[rows].tolist(),
+        options=options,
     )
     saved = model.save(out)
     content = {

@@ -5,36 +5,46 @@ Typer by itself reads "1_0" as 10, takes nan and inf, and doesn't know a decimal
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+import functools
+import inspect
+import operator
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any
 
 import typer
 
 from palpate.errors import UsageError
 from palpate.number_text import whole_number
+from palpate.options import Options, declared
 
-__all__ = ["count_option", "number_option"]
+__all__ = ["count_option", "declared_option", "number_option", "with_options"]
+
+_KEYWORD = inspect.Parameter.KEYWORD_ONLY
+_ENDS = {
+    "least": ("≥", operator.ge),
+    "above": (">", operator.gt),
+    "most": ("≤", operator.le),
+    "below": ("<", operator.lt),
+}
 
 
-def number_option(
-    name: str, unit: str = "", *, least: float | None = None, most: float | None = None, help: str
-) -> Any:
-    """Return the declaration of an option, such as "--seconds", that is a number, in its unit or with another.
+def number_option(name: str, unit: str = "", *, help: str, bare: bool = True, **ends: float | None) -> Any:
+    """Return the declaration of an option that is a number, such as "--seconds".
 
-    A number that stands alone is in the SI unit `unit`, "" for a pure number. `least` and `most` are the ends of the
-    range that is allowed.
+    A number that stands alone is in the SI unit, "" for a pure number, unless `bare` is false; `ends` are those that
+    `checks.fits` takes.
     """
 
     def read(text: str) -> float:
         from palpate.units import parse_quantity  # imports NumPy, which the help needs not
 
-        return parse_quantity(text, unit, name, bare=True)
+        return parse_quantity(text, unit, name, bare=bare)
 
-    return _option(name, read, "NUMBER", unit, (least, most), help)
+    return _option(name, read, "NUMBER", unit, ends, help)
 
 
-def count_option(name: str, *, least: int | None = None, most: int | None = None, help: str) -> Any:
-    """Return the declaration of an option that is a whole number; parameters are those of `number_option`."""
+def count_option(name: str, *, help: str, **ends: float | None) -> Any:
+    """Return the declaration of an option that is a whole number; `ends` are those that `checks.fits` takes."""
 
     def read(text: str) -> int:
         try:
@@ -42,7 +52,7 @@ def count_option(name: str, *, least: int | None = None, most: int | None = None
         except UsageError as error:
             raise UsageError(f"{name}: {error.what}", why=error.why, fix=error.fix) from error
 
-    return _option(name, read, "COUNT", "", (least, most), help)
+    return _option(name, read, "COUNT", "", ends, help)
 
 
 def _option(
@@ -50,15 +60,15 @@ def _option(
     read: Callable[[str], float],
     kind: str,
     unit: str,
-    ends: tuple[float | None, float | None],
+    ends: Mapping[str, float | None],
     help: str,
 ) -> Any:
-    least, most = ends
-    limits = [f"{sign} {end:g}" for sign, end in (("≥", least), ("≤", most)) if end is not None]
+    rules = [(*_ENDS[end], bound) for end, bound in ends.items() if bound is not None]
+    limits = [f"{sign} {bound:g}" for sign, _, bound in rules]
 
     def parse(text: Any) -> Any:
         value = read(text) if isinstance(text, str) else text  # older Typers hand over the default, too
-        if value is None or ((least is None or value >= least) and (most is None or value <= most)):
+        if value is None or all(is_within(value, bound) for _, is_within, bound in rules):
             return value
         raise UsageError(
             f"{name}: {text} is out of range.", fix=f"Give {' and '.join(limits)} {unit}".rstrip() + "."
@@ -67,3 +77,61 @@ def _option(
     return typer.Option(
         name, parser=parse, metavar=f"{kind} ({', '.join(limits)})" if limits else kind, help=help
     )
+
+
+def declared_option(record: type[Options], field: str, help: str = "") -> Any:
+    """Return the declaration of a command's option by that in a record of options; a `help` says it otherwise."""
+    declaration = declared(record)[field]
+    name, text = declaration.flag or f"--{field}".replace("_", "-"), help or declaration.sentence
+    if declaration.kind.startswith("float"):
+        return number_option(name, declaration.unit, help=text, bare=declaration.bare, **declaration.ends)
+    is_count = declaration.kind.startswith("int")
+    return count_option(name, help=text, **declaration.ends) if is_count else typer.Option(name, help=text)
+
+
+def _parameters(source: Any) -> list[inspect.Parameter]:
+    """Return the options of a command that a record of options makes, or a function whose parameters are options."""
+    if not (isinstance(source, type) and issubclass(source, Options)):
+        return list(inspect.signature(source, eval_str=True).parameters.values())
+    kinds: dict[str, Any] = {"float": float, "int": int, "str": str, "tuple": list[str]}
+    parameters = []
+    for name, declaration in declared(source).items():
+        if declaration.flag != "none":
+            default = None if declaration.default == () else declaration.default
+            kind = next(known for word, known in kinds.items() if declaration.kind.startswith(word))
+            kind = kind | None if default is None else kind
+            wanted = Annotated[kind, declared_option(source, name)]  # type: ignore[valid-type]
+            parameters.append(inspect.Parameter(name, _KEYWORD, default=default, annotation=wanted))
+    return parameters
+
+
+def with_options(**groups: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator of commands: in place of a parameter the command has the options that make its value.
+
+    For each parameter that stands for several options a group names a record of options, or a function of them.
+    """
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        options = {name: _parameters(source) for name, source in groups.items()}
+        own = inspect.signature(command, eval_str=True).parameters.values()
+        parameters = [p for argument in own for p in options.get(argument.name, [argument])]
+        parameters = [p.replace(kind=_KEYWORD) for p in parameters]
+
+        @functools.wraps(command)
+        def run(**arguments: Any) -> None:
+            for name, source in groups.items():
+                values = {p.name: arguments.pop(p.name) for p in options[name]}
+                given = {key: value for key, value in values.items() if value is not None}
+                arguments[name] = source(
+                    **{
+                        key: tuple(value) if isinstance(value, list) else value
+                        for key, value in given.items()
+                    }
+                )
+            command(**arguments)
+
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        return run
+
+    return decorate

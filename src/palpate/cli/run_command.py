@@ -13,15 +13,14 @@ from pathlib import Path
 from palpate.cli.console import Console
 from palpate.cli.live_table import live_table
 from palpate.cli.terminal_keys import RESUME, STOP, Keys, terminal_keys
-from palpate.devices import device_traits
 from palpate.format import share
 from palpate.runtime import LoopProcess
 from palpate.runtime.shared_state import State
-from palpate.runtime.touchable import Touchable, load_touchable
+from palpate.runtime.touchable import load_touchable
 from palpate.runtime.warm_up import WarmUp
 from palpate.surrogates.surrogate import correction_warning
 
-__all__ = ["aim_device", "run_loop"]
+__all__ = ["run_loop"]
 
 LOOK = 0.02  # s between two looks at the loop
 _REFRESH = 10.0  # Hz, of the live table
@@ -91,21 +90,19 @@ def run_loop(
     controller damp, and with `dead_man` the force acts only while the device's first button is held. `record` is a new
     file that takes every tick; if it stops by itself the loop runs on, and a `ResourceError` follows the report.
     """
-    # the loop's kernels are compiled beside the body's
-    with WarmUp("loop") as warm_up:
-        touch = load_touchable(model)
-        settings = touch.meta.get("runtime", {})
-        rate = rate or settings.get("rate", 1000.0)
-        if warm_up.words:
-            console.say(f"{warm_up.words} …")
-        device = aim_device(device, touch)
-        warm_up.wait()
+    touch = load_touchable(model)
+    settings = touch.meta.get("runtime", {})
+    rate = rate or settings.get("rate", 1000.0)
     if warning := correction_warning(touch.meta):
         console.say(f"its correction was warned of: {warning}")
     limit = settings.get("max_force")
     peak = _Peak()
+    warm_up = WarmUp("loop", body=touch)
+    if warm_up.words:
+        console.say(f"{warm_up.words} …")
     # whoever stops it early still wants to know
     with (
+        warm_up,
         LoopProcess(
             model,
             device=device,
@@ -115,6 +112,7 @@ def run_loop(
             controller=controller,
             dead_man=dead_man,
             record=record,
+            aim=True,
         ) as loop,
         contextlib.suppress(KeyboardInterrupt),
         terminal_keys() as keys,
@@ -144,22 +142,6 @@ def _recording(loop: LoopProcess) -> tuple[str, dict[str, object]]:
         "bytes": recording.size,
     }
     return words, {"recording": facts}
-
-
-def aim_device(device: str, touch: Touchable) -> str:
-    """Return the device; a scripted stroke without a place presses where the body was trained to be pressed."""
-    name, _, text = device.partition(":")
-    scale = touch.workspace(device_traits(device).radius).scale
-    if name not in {"stroke", "simulated"} or touch.holds:
-        return device
-    given = {part.partition("=")[0].strip() for part in text.split(",") if part}
-    axes = {"x", "y", "z"}
-    known = {
-        k: v for k, v in touch.stroke(scale).items() if k not in given and not (k in axes and given & axes)
-    }
-    return f"{name}:" + ",".join(
-        [part for part in (text, *(f"{k}={v:.9g}" for k, v in known.items())) if part]
-    )
 
 
 @contextlib.contextmanager

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from palpate.cli.console import Console
-from palpate.cli.number_options import count_option, number_option
+from palpate.cli.number_options import count_option, declared_option, number_option
 from palpate.cli.table_options import Json
 from palpate.errors import UsageError
-from palpate.processes import CASE_LIMIT
+from palpate.options import ImprovementOptions
 
 __all__ = ["sweep"]
 
@@ -30,10 +31,12 @@ def sweep(
         ),
     ] = None,
     until: Annotated[
-        str | None,
-        typer.Option(
-            help="For a body under a probe: choose solves where the force is least certain, and learn, until this "
-            "force error is kept at the 95th percentile of unseen solves, such as 2%."
+        float | None,
+        declared_option(
+            ImprovementOptions,
+            "until",
+            "For a body under a probe: choose solves where the force is least certain, and learn, until this force "
+            "error is kept at the 95th percentile of unseen solves, such as 2%.",
         ),
     ] = None,
     minutes: Annotated[
@@ -46,15 +49,9 @@ def sweep(
         int | None,
         count_option("--workers", least=1, help="Number of worker processes. Default: one per core."),
     ] = None,
-    case_limit: Annotated[
-        float,
-        number_option(
-            "--case-limit",
-            "s",
-            least=0.1,
-            help="Seconds after which a single solve has failed. It costs that solve; the sweep goes on.",
-        ),
-    ] = CASE_LIMIT,
+    case_limit: Annotated[float, declared_option(ImprovementOptions, "case_limit")] = (
+        ImprovementOptions.case_limit
+    ),
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -87,7 +84,14 @@ def sweep(
     if until is not None:
         from palpate.cli.improvement_lines import improve_file
 
-        improve_file(study, until, minutes, samples, workers, own, Console(as_json), case_limit=case_limit)
+        options = ImprovementOptions(
+            until=until,
+            limit=math.inf if minutes is None else 60.0 * minutes,
+            most=samples or ImprovementOptions.most,
+            workers=workers,
+            case_limit=case_limit,
+        )
+        improve_file(study, options, own, Console(as_json))
         return
     if minutes is not None:
         raise UsageError(

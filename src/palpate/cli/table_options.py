@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import typer
 
-from palpate.cli.number_options import count_option
+from palpate.cli.number_options import count_option, with_options
 from palpate.errors import UsageError
 
-__all__ = ["Force", "Json", "MissingOption", "column_list", "with_table_options"]
+__all__ = ["Force", "Json", "MissingOption", "column_list", "reading_options", "with_table_options"]
 
 Json = Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")]
 Force = Annotated[
@@ -26,7 +24,7 @@ MissingOption = Annotated[
 ]
 
 
-def _reading_options(
+def reading_options(
     encoding: Annotated[
         str | None,
         typer.Option(help="Encoding of the table, such as latin-1. Default: found from its bytes."),
@@ -71,27 +69,8 @@ def _reading_options(
     return {name: value for name, value in given.items() if value is not None}
 
 
-def with_table_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Return a command that has the options of how a table is written in place of its parameter `reading`.
-
-    `reading` gets the options of `palpate.tables.read_table` that were given.
-    """
-    options = inspect.signature(_reading_options, eval_str=True).parameters
-    own = inspect.signature(command, eval_str=True).parameters.values()
-    parameters = [
-        parameter
-        for argument in own
-        for parameter in (options.values() if argument.name == "reading" else [argument])
-    ]
-
-    @functools.wraps(command)
-    def run(**arguments: Any) -> None:
-        given = {name: arguments.pop(name) for name in options}
-        command(reading=_reading_options(**given), **arguments)
-
-    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return run
+with_table_options = with_options(reading=reading_options)
+"""Decorator of a command that has the options of how a table is written in place of its parameter `reading`."""
 
 
 def column_list(texts: Sequence[str], names: Sequence[str]) -> list[str]:

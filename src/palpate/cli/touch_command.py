@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from palpate.cli.number_options import count_option, number_option
+from palpate.cli.number_options import count_option, declared_option, number_option, with_options
 from palpate.cli.table_options import Json
 from palpate.errors import UsageError
 from palpate.file_kinds import PART_FORMATS
+from palpate.options import ImprovementOptions, PartOptions, StopOptions
 
 if TYPE_CHECKING:
     from palpate.cli.console import Console
@@ -22,32 +24,11 @@ if TYPE_CHECKING:
 __all__ = ["touch"]
 
 
+@with_options(choices=PartOptions)
 def touch(
     part: Annotated[Path, typer.Argument(help="Part: STL, OBJ, STEP, VTU, MSH, INP and others.")],
-    unit: Annotated[
-        str | None,
-        typer.Option(
-            help="Unit of the file's numbers. Default: mm, or m where only that fits; else it is asked."
-        ),
-    ] = None,
-    young: Annotated[str | None, typer.Option(help="Young's modulus. Default: 10 kPa.")] = None,
-    poisson: Annotated[
-        float | None, number_option("--poisson", help="Poisson's ratio. Default: 0.45.")
-    ] = None,
-    radius: Annotated[
-        str | None, typer.Option(help="Radius of the ball. Default: by the part's size.")
-    ] = None,
-    depth: Annotated[
-        str | None, typer.Option(help="Largest depth of the ball. Default: half its radius.")
-    ] = None,
-    held: Annotated[
-        list[str] | None,
-        typer.Option(help="Surface of the file that is held. Several times. Default: what it stands on."),
-    ] = None,
-    touched: Annotated[
-        str | None, typer.Option(help="Surface of the file that is touched. Default: what faces up.")
-    ] = None,
-    until: Annotated[str, typer.Option(help="Force error at the 95th percentile that ends it.")] = "2%",
+    choices: Any = None,
+    until: Annotated[float, declared_option(StopOptions, "until")] = StopOptions.until,
     minutes: Annotated[
         float,
         number_option("--minutes", least=0, help="Minutes after which no further batch of solves begins."),
@@ -70,14 +51,10 @@ def touch(
 ) -> None:
     """Open a part on a page, to be touched while solves and learning improve it. Called again, it goes on."""
     from palpate.cli.console import Console
-    from palpate.cli.improvement_lines import share_of
     from palpate.study.run import Paths
 
     console = Console(as_json)
-    asked = {"unit": unit, "young": young, "poisson": poisson, "radius": radius, "depth": depth}
-    choices = {"held": tuple(held or ()), "touched": touched}
-    given = {name: value for name, value in (asked | choices).items() if value not in (None, ())}
-    wanted, limit = share_of(until), 60 * minutes
+    limit = 60 * minutes
     if sys.stdout.isatty() and not as_json if view is None else view:
         from palpate.cli.touch_page import TouchedPart, touch_on_page
 
@@ -86,21 +63,24 @@ def touch(
         notes: list[str] = []
         touch_on_page(
             part.stem,
-            lambda other: _study_on_page(part, given | ({"unit": other} if other else {}), notes, console),
+            lambda other: _study_on_page(
+                part, replace(choices, unit=other) if other else choices, notes, console
+            ),
             lambda study: _write(part, study, notes),
-            TouchedPart(wanted, limit, workers, console),
+            TouchedPart(until, limit, workers, console),
             at_once=start,
             port=port,
             device=device,
             recordings=part.parent,
         )
         return
-    study = _study_of(part, given, console).with_workers(workers)
-    _carry_on(study, Paths(part.parent, study.name), wanted, limit, console)
+    study = _study_of(part, choices, console)
+    options = ImprovementOptions(until=until, limit=limit, workers=workers)
+    _carry_on(study.with_workers(workers), Paths(part.parent, study.name), options, console)
 
 
 def _study_on_page(
-    part: Path, options: dict[str, Any], notes: list[str], console: Console
+    part: Path, choices: PartOptions, notes: list[str], console: Console
 ) -> tuple[Study, Path, bool]:
     """Return the study of a part, its file, and whether that was there; a new one is written at the start.
 
@@ -110,9 +90,9 @@ def _study_on_page(
 
     file = study_file(part)
     if file.exists():
-        return _study_of(part, options, console), file, True
+        return _study_of(part, choices, console), file, True
     with console.patience(f"Reading {part}"):
-        study, held = part_study(part, **_in_si(options))
+        study, held = part_study(part, options=choices)
     notes[:] = held
     console.say("\n".join(filter(None, notes)))
     console.say(f"{_chosen(study)} Change it on the page, and press start there.")
@@ -129,30 +109,19 @@ def _write(part: Path, study: Study, notes: list[str]) -> Path:
     return file
 
 
-def _in_si(options: dict[str, Any]) -> dict[str, Any]:
-    """Return options with their quantities in SI units."""
-    from palpate.units import parse_quantity
-
-    units = {"young": "Pa", "radius": "m", "depth": "m"}
-    return {
-        name: parse_quantity(value, units[name], f"--{name}") if name in units else value
-        for name, value in options.items()
-    }
-
-
-def _study_of(part: Path, options: dict[str, Any], console: Console) -> Study:
+def _study_of(part: Path, choices: PartOptions, console: Console) -> Study:
     """Return the study of a part that lies beside it, or write one with these options."""
     from palpate.files import write_file
     from palpate.study import read_study
     from palpate.study.part_study import part_study, part_text, study_file
 
-    options = _in_si(options)
     file = study_file(part)
     if file.exists():
         with console.patience(f"Reading {file} and {part}"):
             study = read_study(file)
         said = _choices_of(study)
-        if others := [name for name, value in options.items() if not _are_equal(said.get(name), value)]:
+        given = {name: value for name, value in vars(choices).items() if value not in (None, ())}
+        if others := [name for name, value in given.items() if not _are_equal(said.get(name), value)]:
             raise UsageError(
                 f"{file} exists already, and says what is held, touched and of what material.",
                 why=f"It says otherwise of {', '.join('--' + name for name in others)}.",
@@ -162,7 +131,7 @@ def _study_of(part: Path, options: dict[str, Any], console: Console) -> Study:
         console.say(f"Going on with the study {file} …")
         return study
     with console.patience(f"Reading {part}"):
-        study, notes = part_study(part, **options)
+        study, notes = part_study(part, options=choices)
     write_file(file, part_text(study, notes))
     console.say("\n".join(filter(None, notes)))
     console.say(f"{_chosen(study)} {file} says all of it; change it there.")
@@ -215,12 +184,12 @@ def _chosen(study: Study) -> str:
     return f"Held at {held}; {ball} presses {surface}, up to {1e3 * acting.depth[1]:g} mm deep."
 
 
-def _carry_on(study: Study, paths: Paths, until: float, limit: float, console: Console) -> None:
+def _carry_on(study: Study, paths: Paths, options: ImprovementOptions, console: Console) -> None:
     """Improve the study, print each surrogate, and write the report of the last."""
     from palpate.cli.improvement_lines import improve_and_print
     from palpate.study.run import report_study
 
-    outcome, content, failure = improve_and_print(study, paths, until, limit, console)
+    outcome, content, failure = improve_and_print(study, paths, options, console)
     report = report_study(paths.report, [outcome])
     text = f"{outcome.validation}\nreport  {report}\nmodel   {paths.model}   (palpate view {paths.model})"
     console.result(text, content | {"report": str(report)})

@@ -43,7 +43,7 @@ from palpate.devices.crtk_settings import (
     CrtkSettings,
     axes_in_words,
 )
-from palpate.devices.device import ASSUMED_DAMPING, UNPUBLISHED, Driver, Sample, Traits
+from palpate.devices.device import ASSUMED_DAMPING, UNPUBLISHED, Driver, Sample, Traits, time_left
 from palpate.devices.websocket_channel import WebsocketChannel
 from palpate.errors import DeviceError, DeviceStopError
 
@@ -60,8 +60,8 @@ _GRAVITY, _LOCK, _UNLOCK, _LOCKED = (
 )
 _ECHOES = 20  # messages, of whose round trips the median counts
 _RESOLUTION = 6e-5  # m: none is published, the coarsest of all devices is taken
-# poses at the start that are checked and thrown away: no faster than this, m/s, nor farther from the first one, m
-_FIRST, _FASTEST, _REACH = 50, 1.0, 0.3
+# poses at the start that are checked and thrown away, of which none is farther from the first one, m
+_FIRST, _REACH = 50, 0.3
 _ASKS = 5  # times that a limp arm is asked to hold its wrist
 _AGAIN = 0.05  # s after which a force is sent again
 _DRIFT = 2e-4  # s/s by which two clocks may run apart: four times what a bad crystal does
@@ -119,11 +119,11 @@ class CrtkDevice(Driver):
         except BaseException:
             self.close()
             raise
-        self.traits = Traits(
-            s.radius,
-            s.force,
-            ASSUMED_DAMPING,
-            f"radius and force: its options; {UNPUBLISHED}",
+        self.traits = replace(
+            type(self).traits,
+            radius=s.radius,
+            max_force=s.force,
+            source=f"radius and force: its options; {UNPUBLISHED}",
             delay=self._one_way,
             resolution=_RESOLUTION,
             axes=axes_in_words(s.axes),
@@ -191,10 +191,10 @@ class CrtkDevice(Driver):
                 self._publish_force(0.0, 0.0, 0.0)
                 self._publish_force(0.0, 0.0, 0.0)
                 if self._settings.lock:
-                    self._send(op="publish", topic=self._prefix + _UNLOCK, msg={})
+                    self._send("publish", _UNLOCK, msg={})
             for topic in _RECEIVED:
-                self._send(op="unsubscribe", topic=self._prefix + topic)
-            self._send(op="unadvertise", topic=self._wrench)
+                self._send("unsubscribe", topic)
+            self._send("unadvertise", self._wrench)
         except DeviceError:
             pass  # the bridge is gone
         finally:
@@ -270,13 +270,14 @@ class CrtkDevice(Driver):
             return f"reports {self.operating or 'no state'}: {words}"
         return "has not been homed: its positions are wrong" if not self._homed else "is ready"
 
-    def _send(self, **message: object) -> None:
-        self._channel.send(json.dumps(message))
+    def _send(self, operation: str, topic: str, **message: object) -> None:
+        """Send an operation of the bridge on a topic, which is the arm's unless it begins with a slash."""
+        full = topic if topic.startswith("/") else self._prefix + topic
+        self._channel.send(json.dumps({"op": operation, "topic": full} | message))
 
     def _until(self, seconds: float) -> Iterator[None]:
         """Receive while opening, for at most `seconds`; the caller leaves when it has what it waits for."""
-        end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0.0:
+        for left in time_left(seconds):
             yield
             self._now = time.monotonic()
             self._take(self._channel.receive(left))
@@ -291,14 +292,8 @@ class CrtkDevice(Driver):
         for types in ("ros1", "ros2") if s.types == "auto" else (s.types,):
             self._asked = f"palpate-{types}"
             for topic in _RECEIVED if s.state else _RECEIVED[:2]:
-                self._send(
-                    op="subscribe",
-                    id=self._asked,
-                    topic=self._prefix + topic,
-                    type=self._type(topic, types),
-                    throttle_rate=0,
-                    queue_length=1,
-                )
+                kind, latest = self._type(topic, types), {"throttle_rate": 0, "queue_length": 1}
+                self._send("subscribe", topic, id=self._asked, type=kind, **latest)
             self._complaint = ""
             for _ in self._until(s.search):
                 if self._fresh or self._complaint:
@@ -308,7 +303,7 @@ class CrtkDevice(Driver):
                 return types
             complaints.append(f"as {self._type('measured_cp', types)}: {self._complaint or 'silence'}")
             for topic in _RECEIVED:
-                self._send(op="unsubscribe", id=self._asked, topic=self._prefix + topic)
+                self._send("unsubscribe", topic, id=self._asked)
         raise DeviceError(
             f"No position comes from {self._pose}.",
             why=f"The ROS bridge at {s.url} answered, {'; '.join(complaints)}.",
@@ -317,26 +312,16 @@ class CrtkDevice(Driver):
 
     def _advertise(self) -> None:
         for topic in (self._settings.wrench, _ABSOLUTE, "state_command", _ECHO, _GRAVITY, _LOCK, _UNLOCK):
-            self._send(
-                op="advertise",
-                topic=self._prefix + topic,
-                type=self._type(topic, self.types),
-                latch=topic in {_ABSOLUTE, _GRAVITY},
-                queue_size=1,
-            )
-        self._send(op="subscribe", topic=self._echo, type=self._type(_ECHO, self.types), throttle_rate=0)
+            latch = topic in {_ABSOLUTE, _GRAVITY}
+            self._send("advertise", topic, type=self._type(topic, self.types), latch=latch, queue_size=1)
+        self._send("subscribe", self._echo, type=self._type(_ECHO, self.types), throttle_rate=0)
         heard = dict.fromkeys(self._pedals.topics, "pedal")
         if self._settings.lock:
             heard[self._prefix + _LOCKED] = _LOCKED
         for topic, kind in heard.items():
             # every message of a pedal counts: none may push another out of a queue
-            self._send(
-                op="subscribe",
-                id=self._asked,
-                topic=topic,
-                type=self._type(kind, self.types),
-                throttle_rate=0,
-            )
+            kind = self._type(kind, self.types)
+            self._send("subscribe", topic, id=self._asked, type=kind, throttle_rate=0)
 
     def _make_ready(self) -> None:
         """Wait for an arm that is enabled and homed; ask for either where the settings say so."""
@@ -358,7 +343,7 @@ class CrtkDevice(Driver):
                 break
             if wish != asked:
                 asked = wish
-                self._send(op="publish", topic=self._prefix + "state_command", msg={"string": wish})
+                self._send("publish", "state_command", msg={"string": wish})
         if not self.operating:
             raise DeviceError(
                 f"{self.name} tells no operating state.", fix="Start it, or go without by crtk:state=0."
@@ -377,7 +362,7 @@ class CrtkDevice(Driver):
             if s.delay >= 0.0:
                 continue
             sent = time.monotonic()
-            self._send(op="publish", topic=self._echo, msg={"data": str(k + 1)})
+            self._send("publish", self._echo, msg={"data": str(k + 1)})
             for _ in self._until(s.search):
                 if k + 1 in self._echoes:
                     trips.append(time.monotonic() - sent)
@@ -388,8 +373,8 @@ class CrtkDevice(Driver):
                     why=f"A message on {self._echo} did not return within {s.search:g} s, so the delay is not known.",
                     fix="Let the bridge pass that topic, or give the round trip: crtk:delay=SECONDS.",
                 )
-        self._send(op="unsubscribe", topic=self._echo)
-        self._send(op="unadvertise", topic=self._echo)
+        self._send("unsubscribe", self._echo)
+        self._send("unadvertise", self._echo)
         self.round_trip = s.delay if s.delay >= 0.0 else sorted(trips)[len(trips) // 2]
         if self.round_trip > LONGEST_DELAY:
             raise DeviceError(
@@ -416,23 +401,23 @@ class CrtkDevice(Driver):
                     self._ask_for_wrist(held)
             if seen >= _FIRST:
                 break
-        self._check_start(first, seen)
-        self._send(op="unsubscribe", topic=self._twist)
+        self._check_first(first, seen)
+        self._send("unsubscribe", self._twist)
         if self._settings.origin == "here":
             self._origin[:] = self._place
         self._now = -math.inf  # from here on the loop's clock counts
 
     def _ask_for_axes_and_weight(self) -> None:
         for topic in (_ABSOLUTE, _GRAVITY) if self._settings.gravity else (_ABSOLUTE,):
-            self._send(op="publish", topic=self._prefix + topic, msg={"data": True})
+            self._send("publish", topic, msg={"data": True})
 
     def _ask_for_wrist(self, orientation: Mapping[str, float]) -> None:
         """Ask for this orientation of the wrist; a place without one has no wrist to hold."""
         size = math.hypot(*(float(orientation.get(axis) or 0.0) for axis in "xyzw"))
         if self._settings.lock and not self.locked and abs(size - 1.0) < _ROUNDING:
-            self._send(op="publish", topic=self._prefix + _LOCK, msg=dict(orientation))
+            self._send("publish", _LOCK, msg=dict(orientation))
 
-    def _check_start(self, first: np.ndarray | None, seen: int) -> None:
+    def _check_first(self, first: np.ndarray | None, seen: int) -> None:
         if self._complaint:
             raise DeviceError(
                 "The ROS bridge complains.",
@@ -444,13 +429,7 @@ class CrtkDevice(Driver):
                 f"{self.name} sent {seen} positions within {self._settings.search:g} s.",
                 fix=f"It must send {_FIRST} in that time; 200 a second or more are right for touch.",
             )
-        way, speed = math.dist(self._place, first), math.hypot(*self._velocity)
-        if not (way <= _REACH and speed <= _FASTEST):
-            raise DeviceError(
-                f"{self.name} starts with {speed:.3g} m/s and moved by {way:.3g} m.",
-                why=f"A start is slower than {_FASTEST:g} m/s and within {_REACH:g} m.",
-                fix="Hold it still while it is opened.",
-            )
+        self.check_start(math.dist(self._place, first), math.hypot(*self._velocity), _REACH)
 
 
 def _vector(value: Any) -> list[float]:

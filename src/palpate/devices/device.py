@@ -8,13 +8,15 @@ device", goes through the steps.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar, Protocol, Self
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
 from palpate.devices.device_options import settings_from
+from palpate.devices.profiles import DeviceProfile
 from palpate.errors import DeviceError
 from palpate.network.shared_memory import Block
 
@@ -31,11 +33,13 @@ __all__ = [
     "Traits",
     "free_buttons",
     "quantisation_noise",
+    "time_left",
 ]
 
 HARDWARE_PATIENCE = 0.020  # s without a fresh sample after which a motorised device gets zero force
 Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 ASSUMED_DAMPING = 0.5  # N·s/m, of a device whose maker publishes none
+_FASTEST_START = 1.0  # m/s
 UNPUBLISHED = f"damping: none is published, {ASSUMED_DAMPING:g} N·s/m is assumed"
 PLAIN_AXES: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -186,6 +190,7 @@ class Driver:
     settings_kind: ClassVar[type]
     called: ClassVar[str] = "device"
     traits: Traits
+    name = ""  # what an opened device calls itself
     closed = False
 
     @classmethod
@@ -193,10 +198,27 @@ class Driver:
         """Open from texts by option; the address of a service, ``ws://…``, needs no name."""
         return cls(settings_from(cls.settings_kind, options))  # type: ignore[call-arg]
 
+    def limited_traits(self, profile: DeviceProfile, source: str, **own: Any) -> Traits:
+        """Return the kind's traits with the limits of a profile, and before both what is the device's `own`."""
+        limits = ("radius", "max_force", "max_stiffness", "resolution")
+        known = {name: getattr(profile, name) for name in limits} | {"source": source, "name": self.name}
+        return replace(type(self).traits, **(known | own))
+
     def check_open(self) -> None:
         """Refuse the use of a device that is closed."""
         if self.closed:
             raise DeviceError(f"The {self.called} is closed.", fix="Open it again.")
+
+    def check_start(
+        self, far: float, speed: float, reach: float, fix: str = "Hold it still while it is opened."
+    ) -> None:
+        """Refuse a start farther from the centre than `reach`, m, or faster than that of a hand that is still."""
+        if not (far <= reach and speed <= _FASTEST_START):
+            raise DeviceError(
+                f"{self.name} starts {far:.3g} m from its centre with {speed:.3g} m/s.",
+                why=f"A start is within {reach:.3g} m and slower than {_FASTEST_START:g} m/s.",
+                fix=fix,
+            )
 
     def components(self, force: np.ndarray) -> tuple[float, float, float, float]:
         """Return x, y, z and size of a force (3,), N, for a device that is open; one that isn't finite is refused."""
@@ -222,6 +244,13 @@ class ScriptedHand(Driver):
         """Let go."""
         self.sent[:] = 0.0
         self.sample.holding = False
+
+
+def time_left(seconds: float) -> Iterator[float]:
+    """Yield the time that is left, s, until so many seconds are over."""
+    end = time.monotonic() + seconds
+    while (left := end - time.monotonic()) > 0.0:
+        yield left
 
 
 def free_buttons(pressed: int, own: int) -> int:

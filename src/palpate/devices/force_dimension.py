@@ -46,7 +46,7 @@ TYPES = {
 WATCHDOG = 160  # times 125 µs: 20 ms without a force command, and the firmware turns the forces off
 _DELAY = 0.00025  # s: one exchange at the 4 kHz of the link
 _BUTTONS, _MASK = 8, 0xFF  # bits of the mask that are looked at; most devices have one button
-_FIRST, _STEP, _FASTEST = 100, 0.001, 1.0  # samples at the start, s between them; faster is an error, m/s
+_FIRST, _STEP = 100, 0.001  # samples at the start, s between them
 _TOLERANCE = 1.01  # of the force limit that is read back
 _LOOK, _REST = 0.005, 0.5  # s between looks at the status; s of zero force before forces come back
 _BY_HAND = 4000  # looks, 20 s, until a hand has homed a Falcon
@@ -263,19 +263,9 @@ class ForceDimensionDevice(Driver):
             raise DeviceError(
                 f"{self.name} allows no force.", fix="Raise its limit in the vendor's own program."
             )
-        self.traits = Traits(
-            self.profile.radius,
-            force,
-            ASSUMED_DAMPING,
-            f"{self.profile.name}: {self.profile.source}"
-            f"{'; force: the device itself' if force < self.profile.max_force else ''}; {UNPUBLISHED}",
-            delay=_DELAY,
-            axes=AXES,
-            resolution=self.profile.resolution,
-            max_stiffness=self.profile.max_stiffness,
-            buttons=_BUTTONS,
-            name=self.name,
-        )
+        own_word = "; force: the device itself" if force < self.profile.max_force else ""
+        source = f"{self.profile.name}: {self.profile.source}{own_word}; {UNPUBLISHED}"
+        self.traits = self.limited_traits(self.profile, source, max_force=force)
 
     def _home(self) -> None:
         """Refuse a device whose encoders count from anywhere, or let it home itself where that was asked for."""
@@ -346,12 +336,8 @@ class ForceDimensionDevice(Driver):
                 continue
             speed = math.dist(place, before) / max(_STEP, now - then) if before else 0.0
             before, then = place, now
-            if not (math.hypot(*place) <= 2.0 * self.traits.radius and speed <= _FASTEST):
-                raise DeviceError(
-                    f"{self.name} starts at {', '.join(f'{x:.3g}' for x in place)} m with {speed:.3g} m/s.",
-                    why=f"A start is within {2.0 * self.traits.radius:g} m of the centre and below {_FASTEST:g} m/s.",
-                    fix="Home it, and hold it still while it is opened.",
-                )
+            fix = "Home it, and hold it still while it is opened."
+            self.check_start(math.hypot(*place), speed, 2.0 * self.traits.radius, fix)
         if before is None:
             raise DeviceError(f"{self.name} repeats old positions.", fix="Connect it to another USB port.")
         self.sample.position[:] = before

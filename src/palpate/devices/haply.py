@@ -25,18 +25,9 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
+from palpate.devices import haply_frames
 from palpate.devices.device import ASSUMED_DAMPING, UNPUBLISHED, Driver, Sample, Traits, free_buttons
 from palpate.devices.device_options import DeviceOptions, number, word
-from palpate.devices.haply_frames import (
-    OLD_HTTP_PORT,
-    ask_scale,
-    choose_profile,
-    decode_frame,
-    device_types,
-    grips_in,
-    read_buttons,
-    read_vector,
-)
 from palpate.devices.profiles import PROFILES, DeviceProfile
 from palpate.devices.websocket_channel import WebsocketChannel
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError
@@ -51,7 +42,7 @@ _PRESET = "arm_front_centered"  # the origin in the middle of the reach
 _GOODBYE = 0.05  # s for each of the two answers that may be outstanding at the end
 _LOST = 0.010  # s after which an answer counts as lost
 _PROOF, _PROVING_FORCE = 50, 0.05  # commands of more than that many N until an echo is missed
-_FIRST, _FASTEST = 50, 1.0  # samples at the start that are checked and thrown away; faster is an error, m/s
+_FIRST = 50  # samples at the start that are checked and thrown away
 _REACH, _IMPOSSIBLE = 0.5, 3  # m from the centre that no arm reaches; samples in a row until that is an error
 _BUTTONS = 4  # of the grip that has the most
 _NEEDED = ("power_supply", "calibrated", "ready")
@@ -138,7 +129,7 @@ class HaplyDevice(Driver):
         if frames:
             self.surplus += max(0, len(frames) - self._outstanding)
             self._outstanding = max(0, self._outstanding - len(frames))
-            self._take(self._entry(decode_frame(frames[-1])))
+            self._take(self._entry(haply_frames.decode_frame(frames[-1])))
         if self._stop:
             raise self._stop_kind(self._stop, fix="Free the device, then start again.")
         if math.isinf(self._asked):
@@ -196,7 +187,7 @@ class HaplyDevice(Driver):
                     fix="Check its power supply and calibrate it in the Haply Hub.",
                 )
         self._prove(state)
-        place = read_vector(state, "cursor_position", math.nan)
+        place = haply_frames.read_vector(state, "cursor_position", math.nan)
         if math.hypot(*place) > _REACH:
             self._impossible += 1
             if self._impossible >= _IMPOSSIBLE:
@@ -220,7 +211,7 @@ class HaplyDevice(Driver):
                 "Give spelling=values, and see that the hand is pushed; if not, spelling=vector."
             )
             return
-        echo = np.array(read_vector(state, "current_cursor_force", 0.0)) / self._scale
+        echo = np.array(haply_frames.read_vector(state, "current_cursor_force", 0.0)) / self._scale
         along = float(echo @ self._force) / self._sent**2
         if 0.1 < along < 10.0:
             self.proven = True
@@ -263,8 +254,8 @@ class HaplyDevice(Driver):
         """Take the buttons of the grips, in the order of their names; the one that holds is the driver's own."""
         sample, own = self.sample, self._settings.hold
         sample.holding, sample.buttons = not own, 0
-        for grip in grips_in(frame, self._settings.grip):
-            pressed = read_buttons(grip)
+        for grip in haply_frames.grips_in(frame, self._settings.grip):
+            pressed = haply_frames.read_buttons(grip)
             mask = sum(down << place for place, down in enumerate(pressed.values()))
             sample.holding = sample.holding or pressed.get(own, False)
             sample.buttons |= free_buttons(mask, list(pressed).index(own) if own in pressed else -1)
@@ -274,8 +265,8 @@ class HaplyDevice(Driver):
         settings = self._settings
         address = urlsplit(settings.url)
         host, port = address.hostname or "localhost", address.port or 10001
-        ports = (int(settings.http),) if settings.http else (port, OLD_HTTP_PORT)
-        scale, reasons = ask_scale(host, ports)
+        ports = (int(settings.http),) if settings.http else (port, haply_frames.OLD_HTTP_PORT)
+        scale, reasons = haply_frames.ask_scale(host, ports)
         if scale is None:
             scale = settings.force_scale
             if scale == 0.0:
@@ -313,7 +304,7 @@ class HaplyDevice(Driver):
 
     def _heed_events(self) -> None:
         for text in self._events.receive(0.0) if self._events else ():
-            event = decode_frame(text)
+            event = haply_frames.decode_frame(text)
             data = event.get("data") or {}
             name = data.get("safety_type") or event.get("name", "")
             if data.get("device_id", self.device_id) != self.device_id:
@@ -328,11 +319,11 @@ class HaplyDevice(Driver):
     def _find(self) -> Mapping[str, Any]:
         """Look for the device until it is there; return the inventory that has it."""
         end = time.monotonic() + self._settings.search
-        frame = decode_frame(self._next())
+        frame = haply_frames.decode_frame(self._next())
         while not frame.get("inverse3") and time.monotonic() < end:
             time.sleep(0.01)
             self._channel.send('{"session":{"force_render_full_state":{}}}')
-            frame = decode_frame(self._next())
+            frame = haply_frames.decode_frame(self._next())
         entries = frame.get("inverse3") or []
         wanted = self._settings.device
         names = [e["device_id"] for e in entries] if isinstance(entries, list) else list(entries)
@@ -352,30 +343,25 @@ class HaplyDevice(Driver):
             raise DeviceError(
                 f"Haply device {self.device_id} is in use by another program.", fix="Close that program."
             )
-        types = device_types(entry)
-        self.profile: DeviceProfile = choose_profile(types)
-        called = f"Haply {' and '.join(types) or 'device'} {self.device_id}"
+        types = haply_frames.device_types(entry)
+        self.profile: DeviceProfile = haply_frames.choose_profile(types)
+        self.name = f"Haply {' and '.join(types) or 'device'} {self.device_id}"
         if self.profile.name == "unknown":
-            called += ", unknown type"
-            self._trust(f"{called}: the least of each limit that this driver knows holds")
-        self.traits = Traits(
-            self.profile.radius,
-            self.profile.max_force,
-            ASSUMED_DAMPING,
+            self.name += ", unknown type"
+            self._trust(f"{self.name}: the least of each limit that this driver knows holds")
+        self.traits = self.limited_traits(
+            self.profile,
             f"{self.profile.source}; {UNPUBLISHED}",
-            axes=AXES,
-            resolution=self.profile.resolution,
             stamped=True,  # a sample is as old as the question to it
             buttons=self._count_buttons(frame),
-            name=called,
         )
 
     def _count_buttons(self, frame: Mapping[str, Any]) -> int:
         """Return how many buttons are left to the loop, and refuse a button to hold that no grip has."""
         own, names = self._settings.hold, dict[str, None]()
         most = 0
-        for grip in grips_in(frame, self._settings.grip):
-            buttons = read_buttons(grip)
+        for grip in haply_frames.grips_in(frame, self._settings.grip):
+            buttons = haply_frames.read_buttons(grip)
             if not buttons:
                 self._trust(f"Haply grip {grip.get('device_id')} tells of no button in a form that is known")
             names |= dict.fromkeys(buttons)
@@ -406,17 +392,13 @@ class HaplyDevice(Driver):
             message = {"inverse3": [{"device_id": self.device_id, "commands": command}]}
             if sample == _FIRST - 2:  # the last answer has the configuration
                 message["session"] = {"force_render_full_state": {}}
-            entry = self._entry(decode_frame(self._next()))
+            entry = self._entry(haply_frames.decode_frame(self._next()))
             if sample > _FIRST // 2:  # several drivers deliver garbage at first
                 state = entry.get("state") or {}
-                place = read_vector(state, "cursor_position", math.nan)
-                speed = read_vector(state, "cursor_velocity", 0.0)
-                if not (math.hypot(*place) <= _REACH and math.hypot(*speed) <= _FASTEST):
-                    raise DeviceError(
-                        f"Haply device {self.device_id} starts at {place} m with {speed} m/s.",
-                        why=f"A start is within {_REACH:g} m of the centre and slower than {_FASTEST:g} m/s.",
-                        fix="Calibrate it in the Haply Hub, and hold it still while it is opened.",
-                    )
+                place = haply_frames.read_vector(state, "cursor_position", math.nan)
+                speed = haply_frames.read_vector(state, "cursor_velocity", 0.0)
+                fix = "Calibrate it in the Haply Hub, and hold it still while it is opened."
+                self.check_start(math.hypot(*place), math.hypot(*speed), _REACH, fix)
                 self._take(entry)
         preset = (entry.get("config") or {}).get("preset", "")
         if preset not in {"", _PRESET}:

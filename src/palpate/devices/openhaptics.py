@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.devices import openhaptics_servo as servo
 from palpate.devices.device import (
     ASSUMED_DAMPING,
     HARDWARE_PATIENCE,
@@ -33,19 +34,6 @@ from palpate.devices.device import (
 )
 from palpate.devices.device_options import DeviceOptions, number, word
 from palpate.devices.openhaptics_library import LOST, NO_DEVICE, Code, HdError, HdLibrary
-from palpate.devices.openhaptics_servo import (
-    CAUSE,
-    FATAL,
-    FATAL_INTERNAL,
-    FIRST,
-    INTERNAL,
-    LEAVING,
-    RESUMED,
-    SILENCE,
-    STOPS,
-    Mailbox,
-    servo,
-)
 from palpate.devices.profiles import DeviceProfile, device_profile, weakest_profile
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError
 
@@ -57,7 +45,7 @@ AXES = PLAIN_AXES
 _MODELS = {"touch x": "desktop", "touchx": "desktop", "desktop": "desktop", "omni": "omni", "touch": "touch"}
 _MASS = 0.045  # kg, apparent at the tip of a Touch (3D Systems' data sheet)
 _PRIORITY = 0xFFFF  # of the callback, the highest
-_START, _FASTEST = 2.0, 1.0  # s that the frames of the start may take; faster is an error, m/s
+_START = 2.0  # s that the frames of the start may take
 _MARGIN, _UNSTATED_REACH = 0.02, 0.4  # m around the largest workspace; m of reach where none is stated
 # s of zero force after an error, at first and at most: doubled where an error comes again within _AGAIN, s
 _PAUSE, _LONGEST_PAUSE, _AGAIN = 0.1, 5.0, 10.0
@@ -122,7 +110,7 @@ class OpenHapticsDevice(Driver):
         self._handle, self._running = 0, False
         self._device = self._connect()
         patience = round(HARDWARE_PATIENCE * settings.rate) - 2
-        self._box = Mailbox(self._hd.addresses(), self._device, patience)
+        self._box = servo.Mailbox(self._hd.addresses(), self._device, patience)
         self._cells = self._box.cells
         try:
             self._identify()
@@ -144,9 +132,9 @@ class OpenHapticsDevice(Driver):
             sample.holding = not (inkwell and self._rests) and (switch or not self._needs_switch)
             sample.clutched = self._clutch >= 0 and bool(mask >> self._clutch & 1)
             sample.buttons = free_buttons(mask, self._clutch)
-        if cells[FATAL] != 0.0:
+        if cells[servo.FATAL] != 0.0:
             raise self._failure()
-        if (stops := int(cells[STOPS])) != self._resumed:
+        if (stops := int(cells[servo.STOPS])) != self._resumed:
             if stops != self._told:
                 self._take_stop(stops, now)
             raise DeviceStopError(self._words)
@@ -162,7 +150,7 @@ class OpenHapticsDevice(Driver):
         if self._told != self._resumed and norm == 0.0 and self._now >= self._until:
             if not self._hd.hdIsEnabled(Code.FORCE_OUTPUT):
                 self._hd.hdEnable(Code.FORCE_OUTPUT)
-            self._cells[RESUMED] = self._resumed = self._told
+            self._cells[servo.RESUMED] = self._resumed = self._told
 
     def close(self) -> None:
         """Zero force in a last frame, then stop the scheduler and let go."""
@@ -170,7 +158,7 @@ class OpenHapticsDevice(Driver):
             return
         self.closed = True
         hd = self._hd
-        self._cells[LEAVING] = 1.0
+        self._cells[servo.LEAVING] = 1.0
         if self._running:
             end = time.monotonic() + _GOODBYE
             while hd.hdWaitForCompletion(self._handle, 0) and time.monotonic() < end:
@@ -184,11 +172,11 @@ class OpenHapticsDevice(Driver):
 
     def _take_stop(self, stops: int, now: float) -> None:
         """Keep the force at zero for a pause, longer where the last stop was not long ago."""
-        cause = self._cells[CAUSE]
-        if cause == SILENCE:
+        cause = self._cells[servo.CAUSE]
+        if cause == servo.SILENCE:
             self._words = f"The loop sent {self.name} no force for {1e3 * HARDWARE_PATIENCE:.0f} ms."
         else:
-            error = HdError(int(cause), int(self._cells[INTERNAL]), self._device)
+            error = HdError(int(cause), int(self._cells[servo.INTERNAL]), self._device)
             self._words = f"{self.name} has turned its forces off: {self._hd.in_words(error)}."
         if stops > self._told + 1 or self._told == self._resumed:  # not the same one, still going on
             again = now - self._failed < _AGAIN
@@ -197,7 +185,7 @@ class OpenHapticsDevice(Driver):
 
     def _failure(self) -> DeviceError:
         """Return the error that ended the calls."""
-        error = HdError(int(self._cells[FATAL]), int(self._cells[FATAL_INTERNAL]), self._device)
+        error = HdError(int(self._cells[servo.FATAL]), int(self._cells[servo.FATAL_INTERNAL]), self._device)
         kind = DeviceLostError if error.code in LOST else DeviceError
         words = f"{self.name} has failed: {self._hd.in_words(error)}."
         return kind(words, fix="Check cable and power, then start again.")
@@ -240,21 +228,16 @@ class OpenHapticsDevice(Driver):
         self._centre, inner = _middle(usable)
         outer = [abs(side * _MM - self._centre[i % 3]) for i, side in enumerate(largest)]
         corner = math.hypot(*(max(outer[i], outer[i + 3]) for i in range(3))) if outer else 0.0
-        self.traits = Traits(
-            min(self.profile.radius, inner),
-            min(self.profile.max_force, force),
-            ASSUMED_DAMPING,
-            f"the smaller of its own figures and those of {self.profile.name}: {self.profile.source}; "
-            f"{UNPUBLISHED}; mass: the data sheet of a Touch",
-            mass=_MASS,
+        self.traits = self.limited_traits(
+            self.profile,
+            f"the smaller of its own figures and those of {self.profile.name}: {self.profile.source}; {UNPUBLISHED}; "
+            "mass: the data sheet of a Touch",
+            radius=min(self.profile.radius, inner),
+            max_force=min(self.profile.max_force, force),
             delay=2.0 / self._settings.rate,
-            axes=AXES,
-            resolution=self.profile.resolution,
             max_stiffness=min(self.profile.max_stiffness, stiffness / _MM),
             continuous_force=continuous,
             reach=corner + _MARGIN if math.isfinite(corner) and corner > 0.05 else _UNSTATED_REACH,
-            buttons=_BUTTONS,
-            name=self.name,
         )
 
     def _calibrate(self) -> None:
@@ -289,28 +272,26 @@ class OpenHapticsDevice(Driver):
         hd.hdSetSchedulerRate(rate)
         self._refuse(hd.errors(), f"doesn't run at {rate} Hz", "Try openhaptics:rate=500.")
         cells = self._cells.ctypes.data
-        self._handle = hd.hdScheduleAsynchronous(servo().address, cells, _PRIORITY)
+        self._handle = hd.hdScheduleAsynchronous(servo.servo().address, cells, _PRIORITY)
         self._refuse(hd.errors(), "takes no callback", "Close other programs that use it.")
         hd.hdStartScheduler()
         self._running = True
         self._refuse(hd.errors(), "has no running scheduler", "Close other programs that use it.")
         end = time.monotonic() + _START
-        while self._box.read(self._place)[0] < FIRST and not self._cells[FATAL] and time.monotonic() < end:
+        while time.monotonic() < end and not self._cells[servo.FATAL]:
+            if self._box.read(self._place)[0] >= servo.FIRST:
+                break
             time.sleep(1e-3)
-        if self._cells[FATAL] != 0.0:
+        if self._cells[servo.FATAL] != 0.0:
             raise self._failure()
-        if (frames := self._box.read(self._place)[0]) < FIRST:
+        if (frames := self._box.read(self._place)[0]) < servo.FIRST:
             raise DeviceError(f"{self.name} gave {frames} positions in {_START:g} s.", fix="Start it again.")
         # several drivers deliver garbage at first
-        for *place, u, v, w in self._box.early()[FIRST // 2 :].tolist():
+        for *place, u, v, w in self._box.early()[servo.FIRST // 2 :].tolist():
             far = math.hypot(*(p * _MM - c for p, c in zip(place, self._centre, strict=True)))
             speed = math.hypot(u, v, w) * _MM
-            if not (far <= self.traits.reach and speed <= _FASTEST):
-                raise DeviceError(
-                    f"{self.name} starts {far:.3g} m from its centre with {speed:.3g} m/s.",
-                    why=f"A start is within {self.traits.reach:.3g} m and slower than {_FASTEST:g} m/s.",
-                    fix="Calibrate it, and hold it still while it is opened.",
-                )
+            fix = "Calibrate it, and hold it still while it is opened."
+            self.check_start(far, speed, self.traits.reach, fix)
 
 
 def _positive(values: tuple[float, ...]) -> float:

@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from palpate.devices.device import Sample, ScriptedHand, Traits
 from palpate.devices.device_options import DeviceOptions, number, settings_from, switch, word
-from palpate.errors import UsageError
+from palpate.devices.trace_file import read_stroke
 
 __all__ = ["RecordedHand", "RecordedSettings"]
 
@@ -37,11 +36,7 @@ class RecordedHand(ScriptedHand):
     traits = Traits(0.075, 20.0, None, "a recorded hand, which no force moves")
 
     def __init__(self, settings: RecordedSettings) -> None:
-        from palpate.devices.trace_file import read_trace  # which needs the table of devices
-
-        trace = read_trace(Path(settings.file))
-        if len(trace) < 2:
-            raise UsageError(f"{settings.file} holds no stroke.", fix="Record a longer touch.")
+        trace = read_stroke(settings.file)
         header = trace.header
         self.traits = Traits(
             float(header["workspace"]["radius"]),

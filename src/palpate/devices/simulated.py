@@ -13,14 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from palpate.devices.device import Driver, Sample, Traits
 from palpate.devices.device_options import DeviceOptions, number, word
 from palpate.devices.profiles import device_profile
-from palpate.errors import UsageError
+from palpate.devices.trace_file import read_stroke
 from palpate.kernels import kernel, part
 
 __all__ = ["SimulatedHand", "SimulatedSettings"]
@@ -90,35 +89,24 @@ class SimulatedHand(Driver):
     def __init__(self, settings: SimulatedSettings | None = None) -> None:
         s = self.settings = settings or SimulatedSettings()
         known, limits = type(self).traits, device_profile(s.profile)
-        self.traits = Traits(
-            limits.radius,
-            limits.max_force,
-            s.damping,
+        self.name = f"simulated {limits.name}"
+        self.traits = self.limited_traits(
+            limits,
             f"a simulation; radius and limits are those of {limits.name}",
+            damping=s.damping,
             mass=min(s.mass, known.mass),
-            stamped=True,
             resolution=s.step,
-            max_stiffness=limits.max_stiffness,
-            name=f"simulated {limits.name}",
         )
         rng = np.random.default_rng(int(s.seed))
         self._sensor, self._error = np.random.default_rng(int(s.seed)), np.zeros(3)
-        self._along = np.array([s.x, s.y, s.z]) / math.hypot(s.x, s.y, s.z)
-        self._frequencies = rng.uniform(_SLOWEST, _FASTEST, (_WAVES, 3))
-        self._phases = rng.uniform(0.0, 2.0 * math.pi, (_WAVES, 3))
-        self._figures = np.array(
-            [
-                s.mass,
-                s.damping + s.grip_damping,
-                s.friction,
-                s.grip,
-                s.amplitude,
-                s.frequency,
-                self.traits.radius,
-            ]
-        )
-        self._shape = _RECORDED if s.file else _SHAPES.index(s.shape)
-        self._path = _recorded_path(s.file) if s.file else np.zeros((2, 4))
+        along = np.array([s.x, s.y, s.z]) / math.hypot(s.x, s.y, s.z)
+        frequencies = rng.uniform(_SLOWEST, _FASTEST, (_WAVES, 3))
+        phases = rng.uniform(0.0, 2.0 * math.pi, (_WAVES, 3))
+        damper, radius = s.damping + s.grip_damping, self.traits.radius
+        figures = np.array([s.mass, damper, s.friction, s.grip, s.amplitude, s.frequency, radius])
+        shape = _RECORDED if s.file else _SHAPES.index(s.shape)
+        path = _recorded_path(s.file) if s.file else np.zeros((2, 4))
+        self._script = (shape, along, figures, frequencies, phases, path)
         self.place, self.velocity, self.push = np.zeros(3), np.zeros(3), np.zeros(3)
         self._clock = np.zeros(2)  # s since the first reading; J of work
         self._past, self._count = np.zeros((_PAST, 4)), 0
@@ -158,19 +146,7 @@ class SimulatedHand(Driver):
         return self.sample
 
     def _move(self, span: float) -> None:
-        _integrate(
-            self.place,
-            self.velocity,
-            self.push,
-            self._clock,
-            span,
-            self._shape,
-            self._along,
-            self._figures,
-            self._frequencies,
-            self._phases,
-            self._path,
-        )
+        _integrate(self.place, self.velocity, self.push, self._clock, span, *self._script)
 
     def write(self, force: np.ndarray) -> None:
         """Push with a force (3,), N, until the next call."""
@@ -184,11 +160,7 @@ class SimulatedHand(Driver):
 
 def _recorded_path(file: str) -> np.ndarray:
     """Return times, s from the first, and places, m, of a recorded hand (N, 4)."""
-    from palpate.devices.trace_file import read_trace  # which needs the table of devices
-
-    trace = read_trace(Path(file))
-    if len(trace) < 2:
-        raise UsageError(f"{file} holds no stroke.", fix="Record a longer touch.")
+    trace = read_stroke(file)
     return np.column_stack([trace.time - trace.time[0], trace.ticks["hand"]])
 
 

@@ -22,14 +22,13 @@ import os
 import select
 import socket
 import struct
-import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from palpate.devices.device import Driver, Sample, Traits, free_buttons
+from palpate.devices.device import Driver, Sample, Traits, free_buttons, time_left
 from palpate.devices.device_options import DeviceOptions, number, word
 from palpate.devices.steering import DeadZone, SteeredHand
 from palpate.errors import DeviceError, DeviceLostError
@@ -204,8 +203,7 @@ class SpaceMouseDevice(Driver):
 
     def _until(self, seconds: float) -> Iterator[None]:
         """Receive while opening, for at most `seconds`; the caller leaves when it has what it waits for."""
-        end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0.0:
+        for left in time_left(seconds):
             select.select([self._socket], (), (), left)
             if self._receive():
                 yield

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["FLAGS", "LEDGER", "MAX_INPUTS", "TICK"]
+__all__ = ["BITS", "FLAGS", "LEDGER", "MAX_INPUTS", "TICK"]
 
 LEDGER = 6  # numbers that the passivity controller publishes
 MAX_INPUTS = 8  # that a body may have besides those that the hand supplies
@@ -30,6 +30,8 @@ FLAGS = (
     "blending",  # another surrogate takes the place of the one in the hand
 )
 """Bits of a tick's flags, the lowest first: append, never reorder."""
+
+BITS = {name: 1 << k for k, name in enumerate(FLAGS)}
 
 TICK = np.dtype(
     [

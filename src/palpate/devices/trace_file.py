@@ -38,7 +38,7 @@ from palpate.errors import FileFormatError, ResourceError, UsageError
 from palpate.files import system_errors
 from palpate.input_files import DAMAGE, plain_texts, read_input
 
-__all__ = ["COLUMNS", "FORMAT", "VERSION", "Trace", "TraceWriter", "read_trace"]
+__all__ = ["COLUMNS", "FORMAT", "VERSION", "Trace", "TraceWriter", "read_stroke", "read_trace"]
 
 FORMAT, VERSION = "palpate trace", 1
 COLUMNS = tuple(name for name in TICK.names or () if name not in {"spare", "checksum"})
@@ -242,6 +242,14 @@ def read_trace(path: str | os.PathLike[str]) -> Trace:
     return Trace(
         path, header, ticks, records.get("state"), tuple(events), records.get("end"), len(data), notes
     )
+
+
+def read_stroke(path: str | os.PathLike[str]) -> Trace:
+    """Read a recorded touch that a hand can follow: one of two ticks or more."""
+    trace = read_trace(path)
+    if len(trace) < 2:
+        raise UsageError(f"{path} holds no stroke.", fix="Record a longer touch.")
+    return trace
 
 
 def _missing(data: bytes, used: int, gaps: list[tuple[int, int]], *, has_end: bool) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from palpate.estimators.radial_regressor import (
     weights_of,
 )
 from palpate.learning import PRESETS, Observation, Settings, freeze, initial, learn, observe
-from palpate.learning.automatic import UNITS_MAX, automatic
+from palpate.learning.learn import UNITS_MAX, automatic
 from palpate.network import Scaling
 from palpate.rbf.filter.prediction import predictive_deviation
 from palpate.rbf.filter.state import State
@@ -37,7 +37,7 @@ class MRANRegressor(RadialRegressor):
     ----------
     target : float
         Error wanted, relative to the outputs' spread: root mean square error over root mean square deviation from
-        the mean. Thresholds and size follow from it and from the data (see `palpate.learning.automatic`).
+        the mean. Thresholds and size follow from it and from the data (see `palpate.learning.learn`).
     settings : Settings or str, optional
         The filter's settings, or the name of a preset, in place of automatic ones; then `target` has no effect.
     form, radial, tail, update, units_max : optional

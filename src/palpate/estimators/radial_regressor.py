@@ -14,7 +14,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from palpate import checks
 from palpate.errors import UsageError
-from palpate.learning.automatic import check_target, ranges_of
+from palpate.learning.learn import check_target, ranges_of
 from palpate.network import Network
 from palpate.units import Quantity, Range
 

@@ -27,15 +27,16 @@ from palpate.improvement.choice_rules import choose_by_disagreement, choose_by_v
 from palpate.improvement.force_model import ForceModel
 from palpate.improvement.kept_solves import KeptSolves
 from palpate.improvement.stop_rule import StopRule, relative_errors
-from palpate.learning import learn_dataset
+from palpate.learning.learn_dataset import learn as learn_dataset
 from palpate.learning.pressed_solves import PROBES, PressedSolves
+from palpate.options import ImprovementOptions, declared, takes
 from palpate.processes import available_cores
 from palpate.surrogates import Surrogate
 from palpate.sweeps import Problem, local_cluster
 
 __all__ = ["RULES", "ImprovementStep", "improve"]
 
-RULES = ("variance", "disagreement", "farthest", "sobol")
+RULES = declared(ImprovementOptions)["rule"].choices
 """Rules that choose the next solves; the last three are there to compare with."""
 
 FIRST = 12  # Sobol places to begin with, of one depth each
@@ -113,26 +114,20 @@ class ImprovementStep:
     model_path: Path | None = None
 
 
+@takes(ImprovementOptions)
 def improve(
     problem: Problem,
     *,
-    until: float = 0.02,
-    limit: float = math.inf,
-    most: int = 400,
     unseen: int | np.ndarray = 40,
-    rule: str = "variance",
     interest: Interest | None = None,
-    seed: int = 0,
-    batch: int | None = None,
     path: Path | str | None = None,
     unseen_path: Path | str | None = None,
     learner: Learner | None = None,
     known: tuple[Surrogate, Any] | None = None,
-    workers: int | None = None,
     cluster: Any = None,
     progress: Any = True,
-    case_limit: float | None = None,
     log: Log = lambda _: None,
+    options: ImprovementOptions,
 ) -> Iterator[ImprovementStep]:
     """Solve a body under a probe where the force is least certain, learn, and yield each step, until an error is kept.
 
@@ -140,38 +135,22 @@ def improve(
     ----------
     problem : Problem
         A body under a probe, ``body.problem(SphereProbe(…))``, or a family of bodies.
-    until : float
-        Wanted relative force error at the 95th percentile of unseen solves.
-    limit : float
-        Time in s after which no further batch begins; by default none.
-    most : int
-        Number of solves to learn from after which no further batch begins.
     unseen : int or (U, n) array
         Number of solves to judge by, in depth series of two at places of their own; or their inputs, in the order in
         which they are solved.
-    rule : {"variance", "disagreement", "farthest", "sobol"}
-        How the next solves are chosen.
     interest : callable, optional
         From inputs (C, n) of places to weights (C,) of at least zero: how much an error at each of them counts, such as
         where a hand goes. It is asked anew for each batch; by default all places count the same.
-    seed : int
-        Decides the first places and the candidates.
-    batch : int, optional
-        Solves of a batch; by default a multiple of the workers between 4 and 8.
     path, unseen_path : path, optional
         Datasets (``NAME.zarr``) that keep the solves to learn from and to judge by. A later call goes on with them.
     learner : callable, optional
         From solves and an effort to a surrogate and its record; by default `palpate.learn`.
     known : (surrogate, record), optional
         A surrogate of just these solves, to go on from.
-    workers : int, optional
-        Processes that solve and search; by default one for each core.
     cluster : optional
         A running `local_cluster`, or what else `palpate.sweep` takes.
     progress : bool or callable
         Of each batch: a bar on standard error, or a function (done, total).
-    case_limit : float, optional
-        Time in s after which a single solve has failed.
     log : callable
         Gets one line when a part of the work begins.
 
@@ -187,35 +166,31 @@ def improve(
     SolverError
         If more than half of the first solves fail.
     """
-    _check_problem(problem, rule)
-    stop = StopRule(until, limit, most)
+    _check_problem(problem)
     if isinstance(unseen, int | np.integer):
         checks.fits("The number of unseen solves", unseen, least=1, whole=True)
-        unseen = problem.design(int(unseen), seed + 7, depths=2)  # type: ignore[attr-defined]
-    count_of_workers = workers or available_cores()
-    size = batch or int(
+        unseen = problem.design(int(unseen), options.seed + 7, depths=2)  # type: ignore[attr-defined]
+    count_of_workers = options.workers or available_cores()
+    size = options.batch or int(
         np.clip(count_of_workers * -(-SMALLEST_BATCH // count_of_workers), SMALLEST_BATCH, LARGEST_BATCH)
     )
     began = time.monotonic()
     with contextlib.ExitStack() as stack:
         if cluster is None:
-            cluster = stack.enter_context(local_cluster(workers))
-        options = {"cluster": cluster, "progress": progress}
-        if case_limit is not None:
-            options["case_limit"] = case_limit
+            cluster = stack.enter_context(local_cluster(options.workers))
+        solving = {"cluster": cluster, "progress": progress, "case_limit": options.case_limit}
         work = _Improvement(
             problem,
-            KeptSolves.open(problem, None if path is None else Path(path), **options),
+            KeptSolves.open(problem, None if path is None else Path(path), **solving),
             KeptSolves.open(
-                problem, None if unseen_path is None else Path(unseen_path), design="points", **options
+                problem, None if unseen_path is None else Path(unseen_path), design="points", **solving
             ),
             np.asarray(unseen, dtype=float),
-            stop,
-            rule,
+            StopRule(options.until, options.limit, options.most),
+            options,
             interest,
-            seed,
             size,
-            learner or partial(_learn, workers=workers, log=log),
+            learner or partial(_learn, workers=options.workers, log=log),
             log,
             began,
         )
@@ -226,8 +201,7 @@ def _learn(data: Dataset, effort: float, *, workers: int | None, log: Log) -> tu
     return learn_dataset(data, effort=effort, workers=workers, log=log)
 
 
-def _check_problem(problem: Any, rule: str) -> None:
-    checks.one_of("The rule", rule, RULES)
+def _check_problem(problem: Any) -> None:
     acting = problem.describe().get("interactions", ()) if hasattr(problem, "describe") else ()
     kinds = [entry.get("type") for entry in acting if isinstance(entry, dict)]
     if len(kinds) != 1 or kinds[0] not in PROBES or not hasattr(problem, "design"):
@@ -247,9 +221,8 @@ class _Improvement:
     judging: KeptSolves
     unseen: np.ndarray
     stop: StopRule
-    rule: str
+    options: ImprovementOptions
     interest: Interest | None
-    seed: int
     size: int
     learner: Learner
     log: Log
@@ -265,7 +238,7 @@ class _Improvement:
     def run(self, known: tuple[Surrogate, Any] | None) -> Iterator[ImprovementStep]:
         if len(self.kept) < FIRST:
             self.log(f"{FIRST} solves to begin with")
-            points = self.problem.design(FIRST, self.seed, depths=1)
+            points = self.problem.design(FIRST, self.options.seed, depths=1)
             self.kept.add([point[None] for point in points[len(self.kept) :]])
             yield self._step("solved")
         if known is not None:
@@ -293,9 +266,8 @@ class _Improvement:
         return len(self.judging) >= len(self.unseen)
 
     def _reason(self) -> str:
-        if self._is_complete or self.errors[-1] > self.stop.until:
-            pass
-        elif len(self.errors) == 1:
+        keeps = not self._is_complete and not self.errors[-1] > self.stop.until
+        if keeps and len(self.errors) == 1:
             # a surrogate of an earlier run: all unseen solves judge it before anything else
             self._judge_by(len(self.unseen))
             self.error = self.errors[-1] = self._error(self.best)
@@ -316,21 +288,25 @@ class _Improvement:
 
     def _solve_batch(self) -> None:
         groups = self._choose()
-        self.log(f"{count(sum(map(len, groups)), 'solve')} chosen by {self.rule}")
+        self.log(f"{count(sum(map(len, groups)), 'solve')} chosen by {self.options.rule}")
         self.kept.add(groups)
 
     def _choose(self) -> list[np.ndarray]:
         """Return the points of the next batch, in groups that are solved in order."""
         solved = len(self.kept)
-        if self.rule == "sobol":  # the sequence that began, taken further
-            return [x[None] for x in self.problem.design(solved + self.size, self.seed, depths=1)[solved:]]
+        if self.options.rule == "sobol":  # the sequence that began, taken further
+            return [
+                x[None] for x in self.problem.design(solved + self.size, self.options.seed, depths=1)[solved:]
+            ]
         model = self._fit()
         near = self.error <= NEAR * self.stop.until
-        singles = self.problem.design(CANDIDATES, self.seed + 7919 * (1 + solved), depths=1)
+        singles = self.problem.design(CANDIDATES, self.options.seed + 7919 * (1 + solved), depths=1)
         parts = [singles]
-        if near and self.rule == "variance":
+        if near and self.options.rule == "variance":
             parts.append(
-                self.problem.design(SERIES * DEPTHS, self.seed + 7919 * (1 + solved) + 1, depths=DEPTHS)
+                self.problem.design(
+                    SERIES * DEPTHS, self.options.seed + 7919 * (1 + solved) + 1, depths=DEPTHS
+                )
             )
         X = np.concatenate(parts)
         groups = [np.array([i]) for i in range(len(singles))]
@@ -347,9 +323,9 @@ class _Improvement:
 
     def _picks(self, model: ForceModel, X: np.ndarray, groups: list[np.ndarray]) -> list[int]:
         taken = self.kept.X
-        if self.rule == "farthest":
+        if self.options.rule == "farthest":
             return choose_farthest(model.scaled(X), model.scaled(taken), model.half, model.images, self.size)
-        if self.rule == "disagreement":
+        if self.options.rule == "disagreement":
             return choose_by_disagreement(model, X, self.size)
         costs = np.array([1.0 + FOLLOWS * (len(g) - 1) for g in groups])
         return choose_by_variance(
@@ -375,7 +351,7 @@ class _Improvement:
         self.pressed = self._pressed(train)
         with threadpool_limits(1):
             self.model = ForceModel.fit(
-                self.pressed.solves, self.pressed.baseline, self.model, seed=self.seed
+                self.pressed.solves, self.pressed.baseline, self.model, seed=self.options.seed
             )
         return self.model
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from palpate.dataset import Dataset
-from palpate.errors import UsageError
 from palpate.format import duration, share
+from palpate.options import StopOptions
 from palpate.surrogates import Surrogate
 from palpate.validation.unseen_solves import ForceSamples, TouchSolves
 
@@ -29,29 +28,13 @@ def relative_errors(surrogate: Surrogate, unseen: Dataset | None) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class StopRule:
+class StopRule(StopOptions):
     """The rule that ends an improvement.
 
     A single error below the wanted one may be luck: many surrogates are judged by the same solves, and the search for
     each scatters. So the error must hold for two surrogates in a row, whether the second is kept or not, and the second
     is judged by all unseen solves.
     """
-
-    until: float  # wanted force error at the 95th percentile, relative, between 0 and 1
-    limit: float = math.inf  # s after which nothing more is begun
-    most: int = 400  # solves to learn from after which nothing more is begun
-
-    def __post_init__(self) -> None:
-        if not 0 < self.until < 1:
-            raise UsageError(
-                f"The wanted force error is {self.until}.",
-                why="It is a share of the force.",
-                fix="Give a number between 0 and 1, such as 0.02.",
-            )
-        if not self.limit >= 0 or self.most < 1:
-            raise UsageError(
-                f"The limits are {self.limit} s and {self.most} solves.", fix="Give positive numbers."
-            )
 
     def reason(
         self,

@@ -4,7 +4,7 @@ learn        a fold of the filter's step over a data set
 search       the search for a network's structure, on which stand arrays, energy, fields and structure
 pool         processes that search; ensemble, folds, starts and kernel_layer are the search's other parts
 structure    growth and pruning around the refinement
-arrays       a network from samples alone; automatic: the filter's thresholds from a target
+arrays       a network from samples alone
 stream       learning while it runs: a learner, samples retained, bounded refinement
 bent_body    a dataset of loads and deflections made into a body that a hand holds at one node
 energy       the energy of a body from solved energies, forces and stiffnesses
@@ -19,10 +19,9 @@ learn_dataset  `palpate.learn`: a dataset made into a body that is felt and seen
 
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
-from palpate.learning.automatic import automatic
-from palpate.learning.bent_body import FEWEST, Refinement, hand_coordinates, learn_bent, node_outputs
+from palpate.learning.bent_body import FEWEST, hand_coordinates, node_outputs
 from palpate.learning.energy import EnergyHistory, learn_energy
-from palpate.learning.learn import Learned, freeze, learn
+from palpate.learning.learn import Learned, automatic, freeze, learn
 from palpate.learning.learn_dataset import LearningHistory
 from palpate.learning.learn_dataset import learn as learn_dataset
 from palpate.learning.learning_history import History
@@ -33,6 +32,7 @@ from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.learning.stream.reservoir import Reservoir
 from palpate.learning.structure import grow, prune, refined_network
+from palpate.options import Refinement
 from palpate.rbf.filter.observation import Observation
 from palpate.rbf.filter.settings import PRESETS, Settings, default, founding, recommended
 from palpate.rbf.filter.state import State, initial
@@ -70,7 +70,6 @@ __all__ = [
     "hand_coordinates",
     "initial",
     "learn",
-    "learn_bent",
     "learn_dataset",
     "learn_energy",
     "node_outputs",

@@ -33,11 +33,11 @@ from threadpoolctl import threadpool_limits
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.format import count
-from palpate.learning.energy import EnergyHistory, learn_energy
 from palpate.learning.growth_frames import GrowthRecorder
 from palpate.learning.learn import Learned, learn
 from palpate.learning.structure import refined_network
 from palpate.network import Network
+from palpate.options import Refinement, SearchOptions
 from palpate.rbf.filter.settings import Settings, recommended
 from palpate.rbf.forms import Centred
 from palpate.surrogates import (
@@ -48,152 +48,79 @@ from palpate.surrogates import (
     RestStiffness,
     Solves,
     Stiffening,
-    Surrogate,
 )
 from palpate.units import Quantity, Range, bounds
 
-__all__ = ["FEWEST", "LearntBent", "Refinement", "hand_coordinates", "learn_bent", "node_outputs"]
+__all__ = ["FEWEST", "BentSolves", "hand_coordinates", "node_outputs"]
 
 FEWEST = 4  # solves for an affine map of one input, and one to judge it by
 _OBSERVATIONS = 1250  # five passes over the founding study's 251 training loads
 _LEVEL = 3.0  # of the largest energy: ln(1 + U/U₀) is then nearly as smooth as U
 _UNITS, _EFFORT = (12, 36), (1.0, 0.5)  # of the energy, for one load and for several
-_TARGET, _RIDGE, _TOLERANCE = 1e-9, 1e-13, 1e-9  # solves of beams carry no noise
-
-
-@dataclass(frozen=True)
-class Refinement:
-    """Settings of the refinement of what the sequential filter has found.
-
-    Attributes
-    ----------
-    samples : int
-        Solves used, spread over the training data; 0 for all of them.
-    units_max : int
-        Most units per network.
-    target : float
-        Leave-one-out error at which no more units are added, relative to the outputs' largest deviation.
-    starts : int
-        Starts per number of units.
-    """
-
-    samples: int = 26
-    units_max: int = 6
-    target: float = 5e-7
-    starts: int = 4
+# solves of beams carry no noise, and their baseline has no rivals: one network goes down to round-off
+_NOISELESS = {"choose": False, "networks": 1, "target": 1e-9, "ridge": 1e-13, "tolerance": 1e-9}
 
 
 @dataclass(frozen=True, eq=False)
-class LearntBent:
-    """A body that loads bend, and how it was learnt."""
+class BentSolves:
+    """A body that loads bend: its fields by load, and the solves of the energy of the hand's place."""
 
-    surrogate: Surrogate
-    energy: EnergyHistory  # how its energy was found
-    filter: Learned  # the sequential filter's answer for the nodes' displacements
+    baseline: Baseline
+    solves: Solves
+    options: dict[str, Any]  # of learning that energy
+    fields: dict[
+        str, NodeField
+    ]  # displacements of all nodes, of those asked for, and the filter's answer for these
+    meta: dict[str, Any]
+    filter: Learned  # the sequential filter's network, with its history
 
-
-def learn_bent(
-    train: Dataset,
-    *,
-    heldout: Dataset | None = None,
-    name: str = "beam",
-    settings: Settings | None = None,
-    refinement: Refinement | None = None,
-    passes: int | None = None,
-    seed: int = 0,
-    coupling: float | None = None,
-    effort: float = 1.0,
-    seconds: float | None = None,
-    workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
-    watch: GrowthRecorder | None = None,
-) -> LearntBent:
-    """Learn a body that a hand holds at one node.
-
-    Parameters
-    ----------
-    train : Dataset
-        Solves under loads; rows that did not converge are left out.
-    heldout : Dataset, optional
-        Unseen solves; the filter's error on them is recorded while it learns, and never acted upon.
-    name : str
-        The body's name.
-    settings : Settings, optional
-        Of the sequential filter; `recommended` if left out.
-    refinement : Refinement, optional
-        By default 26 solves and 6 units for one input, all solves and more units for several.
-    passes : int, optional
-        Shuffled presentations of the data; by default five, or as many as make 1,250 observations.
-    seed : int
-        Decides their order, and the starts of every search.
-    coupling : float, optional
-        Stiffness k_c of the virtual coupling at the held node, N/m. By default none for one touched load, and
-        four times the mean lateral stiffness for several.
-    effort : float
-        Multiplies the counts of candidates and iterations of the search for the energy.
-    seconds : float, optional
-        Limit on time of that search; by default none.
-    workers : int, optional
-        Processes that search at a time; the result is the same with any number.
-    progress : callable, optional
-        Called with (done, total) observations of the filter.
-    watch : GrowthRecorder, optional
-        Keeps frames of the filter's growth.
-
-    Raises
-    ------
-    UsageError
-        If there are too few converged solves to learn from, or they have no energies.
-    """
-    good = train.ok
-    _refuse_unfit(good)
-    settings = settings or recommended(len(good.ranges))
-    refinement = refinement or _refinement_for(len(good.ranges))
-    # few solves need more presentations: the filter sees each one's linearisation once per pass
-    passes = passes or max(5, math.ceil(_OBSERVATIONS / len(good)))
-    identity = good.hash
-    few = _with_rest(_spread_rows(good, refinement.samples))
-    good = _with_rest(good)
-    with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
-        outputs, columns = node_outputs(good)
-        sequential = learn(
-            good.X,
-            _columns(good, columns),
-            good.ranges,
-            outputs,
-            settings=settings,
-            passes=passes,
-            seed=seed,
-            heldout=None if heldout is None else (heldout.ok.X, _columns(heldout.ok, columns)),
-            progress=progress,
-            watch=watch,
-        )
-        fields = _fields(few, outputs, columns, sequential, settings, refinement, seed)
-        baseline, solves = _energy_of(few, fields["displacement"], coupling)
-    several = len(few.ranges) > 1
-    energy, found = learn_energy(
-        solves,
-        baseline,
-        choose=False,
-        units_max=_UNITS[several],
-        networks=1,
-        target=_TARGET,
-        ridge=_RIDGE,
-        tolerance=_TOLERANCE,
-        effort=effort * _EFFORT[several],
-        seconds=seconds,
-        workers=workers,
-        seed=seed,
-    )
-    meta = {
-        "name": name,
-        **found.meta,
-        "filter": {"samples": len(good), "passes": passes, "seed": seed, "units": sequential.network.units},
-        "settings": asdict(settings),
-        "refinement": asdict(refinement) | {"used": len(few)},
-        "dataset": {"hash": identity, "provenance": train.provenance},
-    }
-    return LearntBent(Surrogate(energy, fields, meta=meta), found, sequential)
+    @classmethod
+    def of(
+        cls,
+        train: Dataset,
+        search: SearchOptions,
+        *,
+        heldout: Dataset | None = None,
+        settings: Settings | None = None,
+        refinement: Refinement | None = None,
+        passes: int | None = None,
+        coupling: float | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        watch: GrowthRecorder | None = None,
+    ) -> BentSolves:
+        """Learn the fields of solves under loads; the options are those of `palpate.learn` for such a body."""
+        good = train.ok
+        _refuse_unfit(good)
+        settings = settings or recommended(len(good.ranges))
+        refinement = refinement or _refinement_for(len(good.ranges))
+        # few solves need more presentations: the filter sees each one's linearisation once per pass
+        passes = passes or max(5, math.ceil(_OBSERVATIONS / len(good)))
+        few, good = _with_rest(_spread_rows(good, refinement.samples)), _with_rest(good)
+        with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
+            outputs, columns = node_outputs(good)
+            sequential = learn(
+                good.X,
+                _columns(good, columns),
+                good.ranges,
+                outputs,
+                settings=settings,
+                passes=passes,
+                seed=search.seed,
+                heldout=None if heldout is None else (heldout.ok.X, _columns(heldout.ok, columns)),
+                progress=progress,
+                watch=watch,
+            )
+            fields = _fields(few, outputs, columns, sequential, settings, refinement, search.seed)
+            baseline, solves = _energy_of(few, fields["displacement"], coupling)
+        units = sequential.network.units
+        meta = {
+            "filter": {"samples": len(good), "passes": passes, "seed": search.seed, "units": units},
+            "settings": asdict(settings),
+            "refinement": asdict(refinement) | {"used": len(few)},
+        }
+        several = len(few.ranges) > 1
+        options = _NOISELESS | {"units_max": _UNITS[several], "effort": search.effort * _EFFORT[several]}
+        return cls(baseline, solves, options, fields, meta, sequential)
 
 
 def _refuse_unfit(good: Dataset) -> None:

@@ -6,13 +6,15 @@ import numpy as np
 
 __all__ = ["fold_masks", "fold_numbers", "held_out", "near_places"]
 
-_NEIGHBOURS = 10  # away: how far places are from each other, whatever copies there are of each
+_NEIGHBOURS = (
+    10  # the distance to the tenth tells how far places are apart, whatever copies there are of each
+)
 _NEAR = (
     0.05  # of that distance: copies of one place, such as a stand's returns or a star of finite differences
 )
-_SOME = 1000  # samples tell the typical distance
-_TREE = 6  # inputs up to which trees are fast
-_DISTANCES = 4_000_000  # in one block
+_ASKED = 1000  # samples that tell the typical distance
+_TREE_INPUTS = 6  # up to which trees are fast
+_DISTANCES = 4_000_000  # in one block: 32 MB
 
 
 def near_places(X: np.ndarray) -> np.ndarray:
@@ -24,7 +26,7 @@ def near_places(X: np.ndarray) -> np.ndarray:
     neighbours = min(_NEIGHBOURS, len(exact) // 4)
     if neighbours < 1:
         return np.asarray(own.ravel())
-    count = _SOME if X.shape[1] <= _TREE else _SOME // 4
+    count = _ASKED if X.shape[1] <= _TREE_INPUTS else _ASKED // 4
     some = exact[np.linspace(0, len(exact) - 1, min(len(exact), count)).astype(int)]
     reach = _NEAR * float(np.median(_neighbour_distances(exact, some, neighbours)))
     if reach <= 0.0:
@@ -43,7 +45,7 @@ def near_places(X: np.ndarray) -> np.ndarray:
 
 def _neighbour_distances(X: np.ndarray, some: np.ndarray, k: int) -> np.ndarray:
     """Return the distance of each of some samples (S, n) of X (N, n) to its k-th neighbour."""
-    if X.shape[1] <= _TREE:
+    if X.shape[1] <= _TREE_INPUTS:
         from scipy.spatial import KDTree
 
         return np.asarray(KDTree(X).query(some, k + 1)[0])[:, -1]
@@ -63,9 +65,9 @@ def _pairs_within(X: np.ndarray, reach: float) -> np.ndarray:
     """
     from scipy.spatial import KDTree
 
-    if X.shape[1] <= _TREE:
+    if X.shape[1] <= _TREE_INPUTS:
         return np.asarray(KDTree(X).query_pairs(reach, output_type="ndarray"))
-    axes = np.linalg.eigh(np.cov(X.T))[1][:, -_TREE:]
+    axes = np.linalg.eigh(np.cov(X.T))[1][:, -_TREE_INPUTS:]
     pairs = KDTree(X @ axes).query_pairs(reach * (1.0 + 1e-9), output_type="ndarray")
     apart = ((X[pairs[:, 0]] - X[pairs[:, 1]]) ** 2).sum(axis=1)
     return np.asarray(pairs[apart <= reach * reach])

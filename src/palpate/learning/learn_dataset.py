@@ -13,7 +13,7 @@ from typing import Any
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
 from palpate.format import count, share
-from palpate.learning.bent_body import learn_bent
+from palpate.learning.bent_body import BentSolves
 from palpate.learning.energy import EnergyHistory, learn_energy
 from palpate.learning.fields import LearntField, learn_snapshots, lumped_mass
 from palpate.learning.learning_history import History
@@ -21,15 +21,14 @@ from palpate.learning.pad_fit import fit_pad
 from palpate.learning.pad_solves import is_padded, pad_solves
 from palpate.learning.pressed_solves import PressedSolves, is_pressed
 from palpate.learning.search import Budget
+from palpate.options import FieldOptions, SearchOptions, takes
 from palpate.surrogates import Baseline, ContactLaw, Solves, Surrogate
 from palpate.surrogates.baselines import registered_baselines
 
 __all__ = ["LearningHistory", "filter_record", "learn"]
 
-_SHOWN = {
-    "displacement": ("displacement", "m"),
-    "von_mises": ("von Mises stress", "Pa"),
-}  # fields that are learnt where a dataset has them, with what they are called and their units
+# fields that are learnt where a dataset has them, with what they are called and their units
+_SHOWN = {"displacement": ("displacement", "m"), "von_mises": ("von Mises stress", "Pa")}
 _FIELD_SHARE = 0.25  # of the energy's limit on time, for each field: most of a shape is found at once
 _PAD_UNITS, _PAD_NETWORKS = 192, 4  # of one network and of a mean, for a pad in five dimensions
 
@@ -88,26 +87,27 @@ def filter_record(history: Any) -> History | None:
 
 @dataclass(frozen=True, eq=False)
 class _Recognised:
-    """A dataset's baseline and solves, what learning its energy is asked for, and how its fields are learnt."""
+    """A dataset's baseline and solves, and what else is known of the body."""
 
     baseline: Baseline
     solves: Solves
-    options: Mapping[str, Any]
-    learn_field: Callable[[str, str, dict[str, Any]], LearntField] | None = None
+    options: Mapping[str, Any]  # of learning its energy
+    learn_field: Callable[[FieldOptions], LearntField] | None = None
+    fields: Mapping[str, Any] = field(default_factory=dict)  # that are learnt already
+    meta: Mapping[str, Any] = field(default_factory=dict)
+    filter: History | None = None
 
 
+@takes(SearchOptions)
 def learn(
     train: Dataset,
     *,
     name: str = "body",
     layout: Layout | None = None,
     shape: bool = True,
-    effort: float = 1.0,
-    seconds: float | None = None,
-    workers: int | None = None,
-    seed: int = 0,
     log: Log = lambda _: None,
-    **options: Any,
+    options: SearchOptions,
+    **further: Any,
 ) -> tuple[Surrogate, LearningHistory]:
     """Learn a body that can be felt and seen from a dataset of solves.
 
@@ -121,21 +121,17 @@ def learn(
         Of a mesh that is fine wherever the body shall be touched, where the sweep's is fine in a part only.
     shape : bool
         Whether to learn the displacement of the surface too, and the stress there if it is in the dataset.
-    effort : float
-        Multiplies the counts of candidates and iterations of the searches; 0.1 gives a quick look.
-    seconds : float, optional
-        Limit on time for all searches; by default none.
-    workers : int, optional
-        Processes that search at a time; one for each core by default. The result is the same with any number.
-    seed : int
-        Decides all starts, and with them the result.
     log : callable
         Told what begins, as one line.
-    **options
-        Further ones of `palpate.learning.energy.learn_energy`, such as ``units_max``, ``target`` and ``networks``. Of a
+    **further
+        Options of `palpate.learning.energy.learn_energy`, such as ``units_max``, ``target`` and ``networks``. Of a
         pressed body also ``law``, a contact law that is taken as it is, or ``length``, a guess of the depth at which
-        pad and body cross, m; of a held one those of `palpate.learning.fit_pad`; of one that loads
-        bend those of `palpate.learning.learn_bent`.
+        pad and body cross, m; of a held one those of `palpate.learning.fit_pad`. Of one that loads bend ``settings`` of
+        the sequential filter and its ``passes`` over the data, five or as many as make 1,250 observations;
+        ``refinement``, by default of 26 solves and 6 units for one load, of all solves and more units for several; the
+        stiffness ``coupling`` between hand and node, N/m, by default none for one touched load and four times the mean
+        lateral stiffness for several; ``heldout``, unseen solves on which the filter's error is recorded; ``progress``,
+        called with (done, total) observations; and ``watch``, a recorder of the filter's growth.
 
     Returns
     -------
@@ -155,50 +151,40 @@ def learn(
             why="What acts on the body stands in the dataset.",
             fix="Pass what `palpate.sweep` returns; for arrays X and Y use `palpate.fit`.",
         )
-    if "input_node" in train:
-        began = time.monotonic()
-        log(f"energy and shape of {count(len(train.ok), 'solve')}")
-        bent = learn_bent(
-            train, name=name, effort=effort, seconds=seconds, workers=workers, seed=seed, **options
-        )
-        spent = time.monotonic() - began
-        return bent.surrogate, LearningHistory(bent.energy, len(train.ok), spent, filter=bent.filter.history)
-    budget, began = Budget.of(effort, seconds), time.monotonic()
-    known = _recognise(train, layout, options)
-    common: dict[str, Any] = {"effort": effort, "workers": workers, "seed": seed}
+    budget, began = Budget.of(options.effort, options.seconds), time.monotonic()
+    solves = len(train.ok)
+    log(f"energy of {count(solves, 'solve')}")
+    known = _recognise(train, layout, options, further)
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
 
     def limit(share: float) -> float | None:
         """Return a share of the time that is left; nothing where it is not limited."""
-        return None if seconds is None else max(share * budget.left, 0.1)
+        return None if options.seconds is None else max(share * budget.left, 0.1)
 
-    solves = len(known.solves.X)
-    log(f"energy of {solves} solves")
     first = limit(1.0 / (1.0 + _FIELD_SHARE * len(fields)))
-    energy, found = learn_energy(
-        known.solves, known.baseline, **(common | {"seconds": first} | dict(known.options))
-    )
+    searches = vars(options) | {"seconds": first} | dict(known.options)
+    energy, found = learn_energy(known.solves, known.baseline, **searches)
     learnt: dict[str, LearntField] = {}
     for i, shown in enumerate(fields):
         assert known.learn_field is not None
         log("shape" if shown == "displacement" else "stress")
-        left = limit(1.0 / (len(fields) - i))
-        learnt[shown] = known.learn_field(shown, _SHOWN[shown][1], common | {"seconds": left})
-    meta = {**found.meta, "name": name, "dataset": {"hash": train.ok.hash, "provenance": train.provenance}}
-    surrogate = Surrogate(energy, {k: v.field for k, v in learnt.items()}, meta=meta)
-    return surrogate, LearningHistory(found, solves, time.monotonic() - began, learnt)
+        searches = vars(options) | {"seconds": limit(1.0 / (len(fields) - i))}
+        learnt[shown] = known.learn_field(FieldOptions(name=shown, unit=_SHOWN[shown][1], **searches))
+    origin = {"hash": train.ok.hash, "provenance": train.provenance}
+    meta = {**found.meta, **known.meta, "name": name, "dataset": origin}
+    surrogate = Surrogate(energy, {**known.fields, **{k: v.field for k, v in learnt.items()}}, meta=meta)
+    spent = time.monotonic() - began
+    return surrogate, LearningHistory(found, solves, spent, learnt, known.filter)
 
 
-def _recognise(train: Dataset, layout: Layout | None, options: Mapping[str, Any]) -> _Recognised:
-    if is_pressed(train):
-        return _pressed(PressedSolves.of(train, layout), options)
-    if is_padded(train):
-        return _held(train, dict(options))
-    for cls in registered_baselines():
-        pair = cls.recognise(train)
-        if pair is not None:
-            baseline, solves = pair
-            return _Recognised(baseline, solves, {**solves.options, **options})
+def _recognise(
+    train: Dataset, layout: Layout | None, search: SearchOptions, options: Mapping[str, Any]
+) -> _Recognised:
+    """Return the first kind of body that a dataset is of; registered baselines are asked last."""
+    for kind in (_bent, _pressed, _held, _registered):
+        known = kind(train, layout, search, dict(options))
+        if known is not None:
+            return known
     acting = train.provenance.get("problem", {}).get("interactions", [])
     raise UsageError(
         "This dataset is of no kind that can be learnt.",
@@ -207,10 +193,44 @@ def _recognise(train: Dataset, layout: Layout | None, options: Mapping[str, Any]
     )
 
 
-def _pressed(pressed: PressedSolves, options: Mapping[str, Any]) -> _Recognised:
-    def learn_field(name: str, unit: str, searches: dict[str, Any]) -> LearntField:
+def _taken(options: dict[str, Any], *names: str) -> dict[str, Any]:
+    """Return options of these names, and take them out of all."""
+    return {name: options.pop(name) for name in names if name in options}
+
+
+def _bent(
+    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
+) -> _Recognised | None:
+    del layout
+    if "input_node" not in train:
+        return None
+    own = _taken(options, "heldout", "settings", "refinement", "passes", "coupling", "progress", "watch")
+    bent = BentSolves.of(train, search, **own)
+    context: dict[str, Any] = {"fields": bent.fields, "meta": bent.meta, "filter": bent.filter.history}
+    return _Recognised(bent.baseline, bent.solves, bent.options | options, **context)
+
+
+def _registered(
+    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
+) -> _Recognised | None:
+    del layout, search
+    pairs = (cls.recognise(train) for cls in registered_baselines())
+    baseline, solves = next((pair for pair in pairs if pair is not None), (None, None))
+    if baseline is None or solves is None:
+        return None
+    return _Recognised(baseline, solves, {**solves.options, **options})
+
+
+def _pressed(
+    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
+) -> _Recognised | None:
+    if not is_pressed(train):
+        return None
+    pressed = PressedSolves.of(train, layout)
+
+    def learn_field(field: FieldOptions) -> LearntField:
         return learn_snapshots(
-            pressed.snapshots(name, seed=searches["seed"]),
+            pressed.snapshots(field.name, seed=search.seed),
             inputs=pressed.inputs,
             points=pressed.points,
             triangles=pressed.triangles,
@@ -218,23 +238,26 @@ def _pressed(pressed: PressedSolves, options: Mapping[str, Any]) -> _Recognised:
             surface=pressed.surface,
             radius=pressed.radius,
             radius_input=pressed.radius_input,
-            name=name,
-            unit=unit,
-            **searches,
+            options=field,
         )
 
-    given, baseline = dict(options), pressed.baseline
-    law, length = given.pop("law", "auto"), given.pop("length", None)
+    baseline = pressed.baseline
+    law, length = options.pop("law", "auto"), options.pop("length", None)
     if isinstance(law, ContactLaw):
-        baseline, given["choose"] = replace(baseline, law=law), False
+        baseline, options["choose"] = replace(baseline, law=law), False
     elif length is not None:
         baseline = replace(baseline, law=ContactLaw("series", length))
     known = {"deepest": pressed.deepest or None}
-    return _Recognised(baseline, pressed.solves, known | given, learn_field)
+    return _Recognised(baseline, pressed.solves, known | options, learn_field)
 
 
-def _held(train: Dataset, options: dict[str, Any]) -> _Recognised:
+def _held(
+    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
+) -> _Recognised | None:
+    del layout, search
+    if not is_padded(train):
+        return None
     solves = pad_solves(train)
-    of_fit = {k: options.pop(k) for k in ("degree", "stiffening") if k in options}
+    baseline = fit_pad(solves, **_taken(options, "degree", "stiffening"))[0]
     known = {"units_max": _PAD_UNITS, "networks": _PAD_NETWORKS}
-    return _Recognised(fit_pad(solves, **of_fit)[0], solves, known | options)
+    return _Recognised(baseline, solves, known | options)

@@ -30,8 +30,8 @@ __all__ = ["fit_pad"]
 _I, _J = np.triu_indices(3)
 FEWEST = 4  # solves: stiffness at rest and its stiffening have to be found from them, and judged by them
 _RIDGE = 1e-2  # of the polynomial's coefficients: few solves do not decide all of them
-_FIRST = 1e-2  # holds S where the polynomial of ℓ says the same
-_FOLDS, _LEAST = 5, 6
+_START_RIDGE = 1e-2  # of S about its start: holds it where the polynomial of ℓ says the same
+_FOLDS, _FEWEST_TO_JUDGE = 5, 6  # parts left out in turn, and solves from which that judges a degree
 _QUADRATIC = 2  # degree of P while S is searched
 _BETTER = 0.9  # of the error left out, for a higher degree
 _SEED = 0
@@ -101,7 +101,7 @@ def _fit(
     degree: int | str,
     stiffening: int | str,
 ) -> tuple[PadBaseline, dict[tuple[int, int], float]]:
-    n, enough = len(samples.inputs), len(samples) >= _LEAST
+    n, enough = len(samples.inputs), len(samples) >= _FEWEST_TO_JUDGE
     highest = MOST if n > 3 and enough else 0
     search = {d: _Search(d, images, isometries, n - 3) for d in range(MOST + 1)}
     fits, errors = {}, {}
@@ -176,7 +176,9 @@ class _Search:
 
         def missed(unknowns: np.ndarray) -> np.ndarray:
             rows = samples.rows(_baseline(self._rest(unknowns), len(samples.inputs)))
-            return np.concatenate([_solve_weights(columns, rows)[1], _FIRST * (unknowns - theta) / size])
+            return np.concatenate(
+                [_solve_weights(columns, rows)[1], _START_RIDGE * (unknowns - theta) / size]
+            )
 
         solution = least_squares(missed, theta, x_scale=size, max_nfev=rounds, ftol=1e-6, xtol=1e-8).x
         rest = self._rest(solution)

@@ -22,8 +22,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from palpate.errors import UsageError
 from palpate.learning.pool import Pool
+from palpate.options import SearchOptions
 from palpate.rbf.refinement.refine import Refined
 from palpate.rbf.regressors import Regressors
 
@@ -57,15 +57,8 @@ class Budget:
     @classmethod
     def of(cls, effort: float = 1.0, seconds: float | None = None) -> Budget:
         """Return a budget that begins now; `seconds` limits its time."""
-        for name, value in (("effort", effort), ("seconds", 1.0 if seconds is None else seconds)):
-            plain = isinstance(value, (int, float, np.number)) and not isinstance(value, (bool, np.bool_))
-            if not plain or not 0 < value < math.inf:
-                raise UsageError(
-                    f"{name}={value!r} allows no learning.",
-                    why="The effort multiplies the work of a search, 1 by default; seconds limit its time.",
-                    fix="Give a positive number, or leave it out.",
-                )
-        return cls(float(effort), math.inf if seconds is None else time.monotonic() + float(seconds))
+        SearchOptions(effort=effort, seconds=seconds)  # refuses what limits no work
+        return cls(effort, math.inf if seconds is None else time.monotonic() + seconds)
 
     @property
     def left(self) -> float:

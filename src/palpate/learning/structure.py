@@ -170,7 +170,7 @@ def grow(
     def more(units: int, _: Candidate | None) -> Iterator[Candidate]:
         last = search.tried[
             -1
-        ].network  # not the best: a size that gains nothing may be on the way to one that does
+        ].network  # not the best: a size without a gain may be on the way to one that has one
         assert last is not None
         new = units_at_residuals(X, Y, last, units - len(last.theta), seed)
         yield Candidate(regressors, np.vstack([last.theta, new]), "grown")

@@ -268,7 +268,7 @@ def point_into(x, y, work, steps, layout, scales, units, rows, modes, constants)
 @kernel
 def value_into(x, y, work, steps, layout, scales, units, rows, modes, constants) -> bool:
     """Evaluate one point x (n,) into y (m,); False, and nothing done, where x has another size than n."""
-    return point_into(x, y, work, steps, layout, scales, units, rows, modes, constants)
+    return point_into(x, y, work, steps, layout, scales, units, rows, modes, constants)  # type: ignore[no-any-return]
 
 
 @kernel
@@ -384,7 +384,7 @@ def second_order_into(x, g, H, grams, work, steps, layout, scales, units, rows, 
     q, n, h = g.size, x.size, units.shape[1]
     line, _ = _places(work, layout, scales, units)
     _regress(x, line, work, steps, layout, scales, units, constants, 1)
-    combine(work[line], rows, g[:1])
+    _few(work[line], rows, g[:1])  # as `combine` does for one output
     value = g[0]
     _pulled(line, q, work, layout, scales, units)
     first = 1 + n

@@ -1,20 +1,20 @@
-"""The real-time process: ``python -m palpate.runtime MODEL --state NAME --device page``.
+"""The real-time process: ``python -m palpate.runtime OPTIONS``, which are an object of JSON.
 
-Started by `LoopProcess`, which holds this process's standard input: its end of file means that the parent is
-gone, whatever the operating system and however it went. On it come the surrogates that shall take the place of the one
-in the hand (`swap_desk`), a line of JSON each. Standard output carries lines of JSON: one when the loop is about to
-run, one for each such wish, and one when the loop has run.
+Started by `LoopProcess`, which writes the options and holds this process's standard input: its end of file means that
+the parent is gone, whatever the operating system and however it went. On it come the surrogates that shall take the
+place of the one in the hand (`swap_desk`), a line of JSON each. Standard output carries lines of JSON: one when the
+loop is about to run, one for each such wish, and one when the loop has run.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 
 from palpate.devices import Device, device_named
 from palpate.devices.trace_file import read_trace
@@ -28,7 +28,7 @@ from palpate.runtime.replay import is_recorded_model, loop_facts, play
 from palpate.runtime.safety import Limits
 from palpate.runtime.shared_state import Shared
 from palpate.runtime.swap_desk import SwapDesk
-from palpate.runtime.touchable import load_touchable
+from palpate.runtime.touchable import aim_device, load_touchable
 
 __all__ = ["FOREIGN", "main"]
 
@@ -38,7 +38,8 @@ FOREIGN = ("scipy", "ngsolve", "matplotlib", "xarray", "dask", "distributed", "s
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the loop; the exit code is that of the error, 0 without one."""
-    options = _parser().parse_args(arguments)
+    (told,) = sys.argv[1:] if arguments is None else arguments
+    options = SimpleNamespace(**json.loads(told))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole terminal: the parent decides
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # unwinds through the loop's own clean-up
     try:
@@ -48,41 +49,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return error.exit_code
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser("python -m palpate.runtime", description="The 1 kHz loop of palpate.")
-    parser.add_argument("model", help="surrogate, a .palpate file")
-    parser.add_argument("--state", required=True, help="name of the shared memory")
-    parser.add_argument("--ring", default="", help="name of the ring for recordings")
-    parser.add_argument("--replay", default="", help="recorded touch to go through, instead of a device")
-    parser.add_argument("--device", default="page", help="name, or name:key=value,key=value")
-    parser.add_argument("--rate", type=float, default=1000.0, help="Hz")
-    parser.add_argument("--radius", type=float, required=True, help="workspace, m")
-    parser.add_argument("--max-force", type=float, required=True, help="N")
-    parser.add_argument("--slew", type=float, default=0.0, help="N/s; 0: full force in 20 ms")
-    parser.add_argument(
-        "--unsoftened", action="store_true", help="a body too stiff for the device feels so all the same"
-    )
-    parser.add_argument("--no-controller", action="store_true", help="the passivity controller only counts")
-    parser.add_argument(
-        "--dead-man", action="store_true", help="force only while the device's first button is held"
-    )
-    parser.add_argument(
-        "--module", action="append", default=[], help="imported for a file of an unknown kind"
-    )
-    return parser
-
-
-def _run(options: argparse.Namespace) -> int:
+def _run(options: SimpleNamespace) -> int:
     shared = Shared.attach(options.state)
     shared.unlink()  # both sides have it: from here on no kind of death can leave it behind
     desk = SwapDesk(_say)
     orphaned = _watch_parent(desk.ask)
-    import_when_needed(options.module)
+    import_when_needed(options.modules)
     model = load_touchable(options.model)
     if options.replay:
         trace = read_trace(options.replay)
         play(trace, model, shared, orphaned, same=is_recorded_model(trace, options.model))
         return 0
+    if options.aim:
+        options.device = aim_device(options.device, model)
     recorder = None
     if options.ring:
         ring = Ring.attach(options.ring)
@@ -103,14 +82,14 @@ def _run(options: argparse.Namespace) -> int:
         rate=options.rate,
         stiffness=model.stiffness_max if traits.damping is not None else 0.0,
         override=options.unsoftened,
-        control=not options.no_controller,
+        control=options.control,
         dead_man=options.dead_man,
         orphaned=orphaned,
         recorder=recorder,
     )
     loop.out.device(traits.name or options.device.partition(":")[0])
     if recorder is not None:
-        recorder.ring.describe(loop_facts(model, loop, limits))
+        recorder.ring.describe(loop_facts(model, loop, limits) | {"device": options.device})
         recorder.begin(loop)
     _say({"obtained": obtain(), "device_note": _note(device)})
     rehearsal = Rehearsal(model, workspace, limits, options.rate)
@@ -121,7 +100,7 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _open(options: argparse.Namespace, shared: Shared) -> Device:
+def _open(options: SimpleNamespace, shared: Shared) -> Device:
     """Open the device, and refuse one that has no button to hold where one is asked for."""
     device = device_named(options.device, shared.command)
     if options.dead_man and not device.traits.buttons:

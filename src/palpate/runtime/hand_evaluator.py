@@ -28,38 +28,10 @@ from palpate.surrogates.memories import Carry
 from palpate.surrogates.moving_rest import MovingRest
 from palpate.units import Range
 
-__all__ = ["Elastic", "HandEvaluator", "Model", "stiffness_along"]
+__all__ = ["HandEvaluator", "Model", "stiffness_along"]
 
 # slope of d: 1 for a distance, measured 1.0004 at most where five bodies are pressed; behind flat ones it is 6 at s = 0
 _STEEP = 1.2
-
-
-class Elastic(Protocol):
-    """The elastic answer that `HandEvaluator` asks for, such as `palpate.surrogates.SurrogateEvaluator`."""
-
-    force: np.ndarray  # (3,), N, on the hand
-    stiffness: np.ndarray  # (3, 3), ∂F/∂x, N/m; zero where it isn't known
-    inside: bool  # whether the answer is of the trained region
-    slope: np.ndarray  # (3,), ∇q, √J/m
-
-    @property
-    def energy(self) -> float:
-        """Energy, J."""
-        ...
-
-    @property
-    def amplitude(self) -> float:
-        """Signed amplitude q, √J; U = ½ q²."""
-        ...
-
-    @property
-    def depth(self) -> float:
-        """Depth of a probe in the surface at rest, or displacement of what is held, m."""
-        ...
-
-    def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
-        """Renew the attributes at `position` (3,), m, and the further inputs (p,)."""
-        ...
 
 
 class Model(Protocol):
@@ -78,6 +50,8 @@ class Model(Protocol):
 class HandEvaluator:
     """Answers a hand on any body; nothing is allocated.
 
+    The `elastic` answer is a `palpate.surrogates.SurrogateEvaluator`, or has what that has: force, stiffness, energy,
+    amplitude, slope, depth and `inside`, renewed by each call.
     The hand moves a free probe, or, where it `holds`, a patch or a node, whose place the `node` tells of a body drawn
     by its nodes. A `memory` has ``force`` and ``step(position, amplitude, slope, dt)`` as
     `palpate.surrogates.memories.MemoryState` has them; one with ``release(dt)`` moves the rest of what nobody holds,

@@ -30,7 +30,6 @@ import numpy as np
 
 from palpate.devices import Device
 from palpate.devices.device import HARDWARE_PATIENCE
-from palpate.devices.tick_record import MAX_INPUTS
 from palpate.errors import DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.blending import Blend
 from palpate.runtime.coupling import STEPS, Coupling
@@ -41,7 +40,7 @@ from palpate.runtime.publisher import Publisher
 from palpate.runtime.realtime import Metronome, Rest
 from palpate.runtime.recording import TickRecorder
 from palpate.runtime.safety import Fault, Limits, PlaceCheck, Safety, Stop, stalled
-from palpate.runtime.shared_state import MAX_PLACES, Shared
+from palpate.runtime.shared_state import Shared, require_room
 from palpate.runtime.stability import FeltStiffness
 from palpate.runtime.swap import Swap
 from palpate.runtime.workspace import HandFrame, Workspace
@@ -93,18 +92,9 @@ class Loop:
         self.evaluator: HandEvaluator | Blend = model.evaluator()
         self.workspace, self.recorder = workspace, recorder
         self.device = device if recorder is None else recorder.watch(device)
-        if max(len(self.evaluator.loads), len(model.parameters)) > MAX_INPUTS:
-            raise UsageError(
-                f"The model has {len(self.evaluator.loads)} inputs; the runtime carries {MAX_INPUTS}.",
-                fix="Learn it with fewer inputs.",
-            )
+        inputs = max(len(self.evaluator.loads), len(model.parameters))
+        require_room("The body", inputs, len(self.evaluator.indentation))
         self.period = 1.0 / rate
-        if len(self.evaluator.indentation) > MAX_PLACES:
-            raise UsageError(
-                f"The body keeps indentations at {len(self.evaluator.indentation)} places; "
-                f"the runtime carries {MAX_PLACES}.",
-                fix="Save it with a larger spacing.",
-            )
         self.out = Publisher(shared, len(self.evaluator.loads))
         self.safety = Safety(limits, self.period, self.out.force)
         self.out.describe(workspace, limits)

@@ -19,6 +19,7 @@ from palpate.runtime.shared_state import now
 __all__ = ["Check", "survey"]
 
 _ROOT = Path("/")
+_SPUN = 200e-6  # s, which the loop spins for
 _IDLE = 0.5  # load per CPU up to which the loop finds a CPU that nobody else wants
 
 
@@ -41,25 +42,26 @@ def survey(root: Path = _ROOT) -> tuple[Check, ...]:
     return (_scheduling(), _wake_up(), *checks)
 
 
+def _found(name: str, ok: bool, detail: str, remedy: str = "") -> Check:
+    """Return a finding, with what to do about it where it is not as a loop wants it."""
+    return Check(name, ok=ok, detail=detail, remedy="" if ok else remedy)
+
+
 def _scheduling() -> Check:
     name = "real-time scheduling"
     if sys.platform != "linux":
-        return Check(
-            name, ok=False, detail=f"not used on {platform.system()}", remedy="Use Linux for hardware."
-        )
+        return _found(name, False, f"not used on {platform.system()}", "Use Linux for hardware.")
     granted: list[bool] = []
     # a thread of its own: on Linux the policy is the calling thread's, and ends with it
     thread = threading.Thread(target=lambda: granted.append(_may_use_fifo()))
     thread.start()
     thread.join()
-    if granted == [True]:
-        return Check(name, ok=True, detail="SCHED_FIFO is permitted")
-    return Check(
+    return _found(
         name,
-        ok=False,
-        detail="SCHED_FIFO is not permitted",
-        remedy="Add '@users - rtprio 60' to /etc/security/limits.d/palpate.conf and log in again; in a "
-        "container pass --cap-add SYS_NICE.",
+        granted == [True],
+        f"SCHED_FIFO is {'' if granted == [True] else 'not '}permitted",
+        "Add '@users - rtprio 60' to /etc/security/limits.d/palpate.conf and log in again; in a container pass "
+        "--cap-add SYS_NICE.",
     )
 
 
@@ -80,27 +82,23 @@ def _wake_up() -> Check:
         time.sleep(0.001)
         late.append(now() - began - 0.001)
     median, worst = sorted(late)[len(late) // 2], max(late)
-    return Check(
-        "wake-up from sleep",
-        ok=median < 200e-6,  # what the loop spins for
-        detail=f"{1e6 * median:.0f} µs late at the median, {1e6 * worst:.0f} µs at worst of {len(late)}",
-        remedy="" if median < 200e-6 else "Close other programs; the loop's spin can't cover this.",
-    )
+    detail = f"{1e6 * median:.0f} µs late at the median, {1e6 * worst:.0f} µs at worst of {len(late)}"
+    remedy = "Close other programs; the loop's spin can't cover this."
+    return _found("wake-up from sleep", median < _SPUN, detail, remedy)
 
 
 def _processors() -> Check:
     count = os.cpu_count() or 1
-    remedy = "" if count > 1 else "The loop needs a CPU of its own: give the machine a second one."
-    return Check("CPUs", ok=count > 1, detail=f"{count}", remedy=remedy)
+    return _found(
+        "CPUs", count > 1, f"{count}", "The loop needs a CPU of its own: give the machine a second one."
+    )
 
 
 def _governor(root: Path) -> Check:
     text = _read(root / "sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
     if text is None:
-        return Check("CPU governor", ok=True, detail="not readable here")
-    slow = text == "powersave"
-    remedy = "cpupower frequency-set -g performance" if slow else ""
-    return Check("CPU governor", ok=not slow, detail=text, remedy=remedy)
+        return _found("CPU governor", True, "not readable here")
+    return _found("CPU governor", text != "powersave", text, "cpupower frequency-set -g performance")
 
 
 def _container(root: Path) -> Check:
@@ -118,8 +116,7 @@ def _container(root: Path) -> Check:
     remedy = (
         "Lift the limit of CPU time (--cpus of Docker): once it is used up, every thread stops for a while."
     )
-    unlimited = limit == math.inf
-    return Check("container", ok=unlimited, detail=detail, remedy="" if unlimited else remedy)
+    return _found("container", limit == math.inf, detail, remedy)
 
 
 def _load(root: Path) -> Check:
@@ -127,21 +124,17 @@ def _load(root: Path) -> Check:
     try:
         load = float(words[0])
     except (IndexError, ValueError):
-        return Check("load", ok=True, detail="not readable here")
+        return _found("load", True, "not readable here")
     share = load / (os.cpu_count() or 1)
-    remedy = "" if share <= _IDLE else "Close other programs, or wait until they have ended, and look again."
-    return Check(
-        "load",
-        ok=share <= _IDLE,
-        detail=f"{load:.1f} over the last minute, {share:.1f} per CPU",
-        remedy=remedy,
-    )
+    detail = f"{load:.1f} over the last minute, {share:.1f} per CPU"
+    remedy = "Close other programs, or wait until they have ended, and look again."
+    return _found("load", share <= _IDLE, detail, remedy)
 
 
 def _kernel(root: Path) -> Check:
     realtime = _read(root / "sys/kernel/realtime") == "1"
     detail = f"{platform.system()} {platform.release()}" + (", PREEMPT_RT" if realtime else "")
-    return Check("kernel", ok=True, detail=detail)
+    return _found("kernel", True, detail)
 
 
 def _read(path: Path) -> str | None:

@@ -30,7 +30,7 @@ from palpate.runtime.loop_report import LoopReport
 from palpate.runtime.recorder import TraceRecorder, model_facts
 from palpate.runtime.recording import Ring
 from palpate.runtime.shared_state import Shared, State, now
-from palpate.runtime.swap import SECONDS, SHORTEST
+from palpate.runtime.swap import SECONDS, require_blend_time
 from palpate.runtime.touchable import load_touchable
 
 __all__ = ["LoopProcess"]
@@ -73,6 +73,8 @@ class LoopProcess:
         New file that takes every tick from the first on; see `start_recording`.
     replay : path, optional
         Recorded touch that is gone through instead of a device, at the pace at which it was recorded.
+    aim : bool
+        Whether a scripted stroke without a place presses where the body was trained to be pressed.
 
     Raises
     ------
@@ -97,6 +99,7 @@ class LoopProcess:
         parameters: Sequence[float] = (),
         record: str | os.PathLike[str] | None = None,
         replay: str | os.PathLike[str] | None = None,
+        aim: bool = False,
     ) -> None:
         traits = device_traits(device)
         if dead_man and not traits.buttons:
@@ -106,22 +109,19 @@ class LoopProcess:
                 fix="Leave it out; with the page the mouse button itself has to be held.",
             )
         self.device, self.rate = device, rate
-        settings = {
-            "--device": device,
-            "--rate": rate,
-            "--radius": traits.radius if workspace is None else workspace,
-            "--max-force": traits.max_force if max_force is None else max_force,
-            "--slew": slew,
+        self._options: dict[str, Any] = {
+            "model": os.fspath(model),
+            "device": device,
+            "rate": float(rate),
+            "radius": float(traits.radius if workspace is None else workspace),
+            "max_force": float(traits.max_force if max_force is None else max_force),
+            "slew": float(slew),
+            "unsoftened": unsoftened,
+            "control": controller,
+            "dead_man": dead_man,
+            "aim": aim,
+            "replay": "" if replay is None else os.fspath(replay),
         }
-        self._arguments = [os.fspath(model), *(f"{key}={value}" for key, value in settings.items())]
-        if unsoftened:
-            self._arguments.append("--unsoftened")
-        if not controller:
-            self._arguments.append("--no-controller")
-        if dead_man:
-            self._arguments.append("--dead-man")
-        if replay is not None:
-            self._arguments.append(f"--replay={os.fspath(replay)}")
         self._model, self._record, self._replayed = model, record, replay is not None
         self._ring: Ring | None = None
         self.recording: TraceRecorder | None = None
@@ -193,12 +193,7 @@ class LoopProcess:
         DeviceError
             If the process ends, or the blend has not begun within a minute.
         """
-        if not SHORTEST <= seconds < float("inf"):
-            raise UsageError(
-                f"Two surrogates can't be blended in {seconds:g} s.",
-                why="A faster change would be felt as a jump.",
-                fix=f"Give at least {SHORTEST:g} s.",
-            )
+        require_blend_time(seconds)
         if self._replayed:
             raise UsageError(
                 "A recorded touch is replayed: its surrogates are those that were recorded.",
@@ -284,16 +279,11 @@ class LoopProcess:
         return TraceRecorder(_started(self._ring), path, header)
 
     def _popen(self) -> subprocess.Popen[str]:
-        modules = (f"--module={name}" for name in outside_modules())
+        places = {"state": self.shared.name, "ring": _started(self._ring).name}
+        told = json.dumps(self._options | places | {"modules": list(outside_modules())})
         try:
             return subprocess.Popen(
-                [
-                    *(sys.executable, "-m", "palpate.runtime"),
-                    *self._arguments,
-                    f"--state={self.shared.name}",
-                    f"--ring={_started(self._ring).name}",
-                    *modules,
-                ],
+                [sys.executable, "-m", "palpate.runtime", told],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._stderr,

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from palpate.devices.device import Device, Sample, Traits
-from palpate.devices.tick_record import FLAGS, TICK
+from palpate.devices.tick_record import BITS, FLAGS, TICK
 from palpate.network import shared_memory
 from palpate.runtime.realtime import obtain_beside
 from palpate.runtime.snapshot import snapshot
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RecordedDevice", "Ring", "TickRecorder"]
 
-_BIT = {name: 1 << k for k, name in enumerate(FLAGS)}
+_AS_PUBLISHED = ("tick", "hand", "position", "contact", "force", "depth", "stiffness", "delay", "coupling")
 
 _SECONDS, _LEAST = 4.0, 4096  # s of ticks that the ring holds, and ticks at the least
 _FASTEST = 10_000.0  # Hz; a loop at a higher rate is refused, and needs no room before that
@@ -186,23 +186,23 @@ class RecordedDevice:
 
     def read(self, now: float) -> Sample:
         """Return the device's sample, and note it."""
-        self.flags = _BIT["read_failed"]
+        self.flags = BITS["read_failed"]
         sample = self.device.read(now)
         self._position[:] = sample.position
         self._time[()], self._patience[()] = sample.time, sample.patience
         self.flags = (
-            (_BIT["holding"] if sample.holding else 0)
-            | (_BIT["clutched"] if sample.clutched else 0)
-            | (_BIT["asleep"] if sample.asleep else 0)
+            (BITS["holding"] if sample.holding else 0)
+            | (BITS["clutched"] if sample.clutched else 0)
+            | (BITS["asleep"] if sample.asleep else 0)
         )
         return sample
 
     def write(self, force: np.ndarray) -> None:
         """Push with the device, and note the force."""
         self._sent[:] = force
-        self.flags |= _BIT["write_failed"]
+        self.flags |= BITS["write_failed"]
         self.device.write(force)
-        self.flags &= ~_BIT["write_failed"]
+        self.flags &= ~BITS["write_failed"]
 
     def close(self) -> None:
         """Close the device."""
@@ -261,18 +261,8 @@ class TickRecorder:
         flags = device.flags
         for name in FLAGS[5:]:
             if published[name]:
-                flags |= _BIT[name]
-        for name in (
-            "tick",
-            "hand",
-            "position",
-            "contact",
-            "force",
-            "depth",
-            "stiffness",
-            "delay",
-            "coupling",
-        ):
+                flags |= BITS[name]
+        for name in _AS_PUBLISHED:
             views[name][...] = published[name]
         views["time"][()], views["lateness"][()] = loop.now, lateness
         views["wanted"][:] = loop.wanted

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from palpate.devices.device import Sample, Traits
-from palpate.devices.tick_record import FLAGS
+from palpate.devices.tick_record import BITS
 from palpate.devices.trace_file import Trace, TraceWriter
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, FileFormatError, UsageError
 from palpate.runtime.loop import Loop
@@ -45,7 +45,6 @@ _ERRORS: dict[int, type[DeviceError]] = {
 }
 _NEEDED = ("holds", "traits", "workspace", "body_stiffness", "limits", "rate", "override", "control",
            "dead_man", "parameters", "inputs")  # fmt: skip
-_BIT = {name: 1 << k for k, name in enumerate(FLAGS)}
 
 
 def loop_facts(model: Touchable, loop: Loop, limits: Limits) -> dict[str, Any]:
@@ -88,20 +87,20 @@ class ReplayDevice:
         """Return the recorded sample; raise a DeviceError where the recorded driver failed."""
         row, sample = self.row, self.sample
         flags = int(row["flags"])
-        if flags & _BIT["read_failed"]:
+        if flags & BITS["read_failed"]:
             raise _ERRORS.get(int(row["fault"]), DeviceError)("The recorded device failed here.")
         sample.position[:] = row["sample_position"]
         sample.time, sample.patience = float(row["sample_time"]), float(row["patience"])
-        sample.holding = bool(flags & _BIT["holding"])
-        sample.clutched = bool(flags & _BIT["clutched"])
-        sample.asleep = bool(flags & _BIT["asleep"])
-        sample.buttons = 1 if self.dead_man and not flags & _BIT["released"] else 0
+        sample.holding = bool(flags & BITS["holding"])
+        sample.clutched = bool(flags & BITS["clutched"])
+        sample.asleep = bool(flags & BITS["asleep"])
+        sample.buttons = 1 if self.dead_man and not flags & BITS["released"] else 0
         return sample
 
     def write(self, force: np.ndarray) -> None:
         """Remember the force (3,), N; raise a DeviceError where the recorded driver failed."""
         self.sent[:] = force
-        if self.row is not None and int(self.row["flags"]) & _BIT["write_failed"]:
+        if self.row is not None and int(self.row["flags"]) & BITS["write_failed"]:
             raise _ERRORS.get(int(self.row["fault"]), DeviceError)("The recorded device failed here.")
 
     def close(self) -> None:
@@ -203,7 +202,7 @@ class Replay:
         known = self._commands.command.record["parameters"][: self._set.size]
         if not np.array_equal(self._set, known):
             self._commands.write_command(parameters=self._set)
-        stopped = bool(int(row["flags"]) & _BIT["stopped"])
+        stopped = bool(int(row["flags"]) & BITS["stopped"])
         if stopped != self.loop.stop.stopped:
             self._commands.write_command(stop=stopped, resume=not stopped)
         fault = int(row["fault"])

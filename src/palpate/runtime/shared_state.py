@@ -26,7 +26,18 @@ from palpate.runtime.loop_report import BINS, percentile
 from palpate.runtime.safety import Fault
 from palpate.runtime.stability import FeltStiffness
 
-__all__ = ["COMMAND", "INDENTATION", "MAX_PLACES", "STATE", "Block", "Shared", "State", "now", "size_of"]
+__all__ = [
+    "COMMAND",
+    "INDENTATION",
+    "MAX_PLACES",
+    "STATE",
+    "Block",
+    "Shared",
+    "State",
+    "now",
+    "require_room",
+    "size_of",
+]
 
 MAX_PLACES = 4096
 FAULT_KINDS = 16
@@ -248,6 +259,21 @@ def _record_of(kind: type) -> np.dtype[np.void]:
 
 STATE = _record_of(State)
 _DRIVER = (Fault.DEVICE_ERROR, Fault.DEVICE_STOPPED, Fault.DEVICE_LOST)  # whose words say more
+
+
+def require_room(body: str, inputs: int, places: int) -> None:
+    """Refuse a body that has more inputs, or keeps indentations at more places, than is shared."""
+    kinds = (
+        ("inputs", inputs, MAX_INPUTS, "Learn it with fewer inputs."),
+        ("places with an indentation", places, MAX_PLACES, "Save it with a larger spacing."),
+    )
+    for kind, count, most, fix in kinds:
+        if count > most:
+            raise UsageError(
+                f"{body} has {count} {kind}; the runtime carries {most}.",
+                why="The memory that loop and viewer share has room for no more.",
+                fix=fix,
+            )
 
 
 def size_of(indentation: np.ndarray) -> int:

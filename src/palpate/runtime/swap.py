@@ -22,19 +22,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.devices.tick_record import MAX_INPUTS
 from palpate.errors import UsageError
 from palpate.runtime.blending import Blend
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.realtime import SLOW
-from palpate.runtime.shared_state import MAX_PLACES
+from palpate.runtime.shared_state import require_room
 
 if TYPE_CHECKING:
     from palpate.runtime.loop import Loop
     from palpate.runtime.touchable import Touchable
     from palpate.surrogates.memories import Carry
 
-__all__ = ["SECONDS", "SHORTEST", "Swap", "require_same_body", "swap_between"]
+__all__ = ["SECONDS", "SHORTEST", "Swap", "require_blend_time", "require_same_body", "swap_between"]
 
 SECONDS, SHORTEST = 0.2, 0.1  # s that a blend takes by default, and at least
 _UNFELT = 1e-3  # W that blending may always add: a slow hand's device takes more by its own damping
@@ -53,6 +52,16 @@ class _Successor:
     gap: Callable[[np.ndarray], float]
 
 
+def require_blend_time(seconds: float) -> None:
+    """Refuse a time of a blend, s, that is too short."""
+    if not SHORTEST <= seconds < math.inf:
+        raise UsageError(
+            f"Two surrogates can't be blended in {seconds:g} s.",
+            why="A faster change would be felt as a jump.",
+            fix=f"Give at least {SHORTEST:g} s.",
+        )
+
+
 class Swap:
     """One swap, from its first tick to its last; the loop calls `step` at the beginning of each tick.
 
@@ -63,12 +72,7 @@ class Swap:
     """
 
     def __init__(self, successor: _Successor, seconds: float = SECONDS) -> None:
-        if not SHORTEST <= seconds < math.inf:
-            raise UsageError(
-                f"Two surrogates can't be blended in {seconds:g} s.",
-                why="A faster change would be felt as a jump.",
-                fix=f"Give at least {SHORTEST:g} s.",
-            )
+        require_blend_time(seconds)
         self.seconds, self.begun, self.ended = seconds, 0, 0
         self.facts = b""
         self.rehearse: Callable[[], None] = lambda: None
@@ -161,18 +165,7 @@ def swap_between(
             fix="Learn it again.",
         )
     evaluator = new.evaluator()
-    if len(evaluator.loads) > MAX_INPUTS:
-        raise UsageError(
-            f"{new.name} has {len(evaluator.loads)} inputs; the runtime carries {MAX_INPUTS}.",
-            why="The memory that loop and viewer share has room for no more.",
-            fix="Learn it with fewer inputs.",
-        )
-    if len(evaluator.indentation) > MAX_PLACES:
-        raise UsageError(
-            f"{new.name} keeps indentations at {len(evaluator.indentation)} places; the runtime carries {MAX_PLACES}.",
-            why="The memory that loop and viewer share has room for no more.",
-            fix="Save it with a larger spacing.",
-        )
+    require_room(new.name, len(evaluator.loads), len(evaluator.indentation))
     return Swap(_Successor(evaluator, carry, largest, _gap(old, new)), seconds)
 
 

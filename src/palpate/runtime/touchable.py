@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.devices import device_traits
 from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
@@ -29,7 +30,7 @@ from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.surrogate import correction_count, correction_warning
 from palpate.units import Range, bounds
 
-__all__ = ["Touchable", "load_touchable", "touchable"]
+__all__ = ["Touchable", "aim_device", "load_touchable", "touchable"]
 
 _SHARE = 0.75  # of the deepest trained depth: how deep a scripted stroke goes
 _WAY, _PAUSE = 9, 0.1  # places on the way to an end, and the time from one to the next, s
@@ -300,6 +301,28 @@ class Touchable:
 def _from_middle(X: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Return the squared distances (N,) of rows X (N, n) from the middle of ranges, in units of these."""
     return np.asarray((((X - (low + high) / 2.0) / (high - low)) ** 2).sum(axis=1))
+
+
+def aim_device(device: str, body: Touchable) -> str:
+    """Return the device; a scripted stroke without a place presses where the body was trained to be pressed.
+
+    Raises
+    ------
+    UsageError
+        If there is no device of that name.
+    """
+    name, _, text = device.partition(":")
+    scale = body.workspace(device_traits(device).radius).scale
+    if name not in {"stroke", "simulated"} or body.holds:
+        return device
+    given = {part.partition("=")[0].strip() for part in text.split(",") if part}
+    axes = {"x", "y", "z"}
+    known = {
+        k: v for k, v in body.stroke(scale).items() if k not in given and not (k in axes and given & axes)
+    }
+    return f"{name}:" + ",".join(
+        [part for part in (text, *(f"{k}={v:.9g}" for k, v in known.items())) if part]
+    )
 
 
 def touchable(model: Surrogate, name: str = "") -> Touchable:

@@ -19,11 +19,12 @@ from typing import Any, Self
 import numpy as np
 
 from palpate.kernels import FEW, is_ready
-from palpate.network import Network, Scaling
+from palpate.network import Network, Scaling, TrainedRegion
+from palpate.network.network_kernels import second_order_into
 from palpate.processes import end_with_input, helper_environment
 from palpate.runtime.blending import _mix, compile_blend
 from palpate.runtime.timing_test import measure_timing
-from palpate.runtime.touchable import touchable
+from palpate.runtime.touchable import Touchable, touchable
 from palpate.surrogates import (
     ContactBaseline,
     ContactLaw,
@@ -37,6 +38,7 @@ from palpate.surrogates import (
     Surrogate,
     TouchedSurface,
 )
+from palpate.surrogates.energy_kernels import entry_of
 from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
 from palpate.surrogates.fields.field_kernels import field_into
 from palpate.surrogates.fields.local_mode import LocalMode
@@ -48,6 +50,7 @@ __all__ = ["SECONDS", "WarmUp", "main", "rod", "slab"]
 SECONDS = {"loop": 3, "held": 8, "pressed": 14}
 """Time in s that the kernels of a kind take to compile, about; for what a person is told."""
 
+_BODY = 6  # s, the kernel of a body's energy
 _NICE = 5  # below everything that somebody waits for
 _SIDE, _CELL = 8, 0.01  # nodes and spacing (m) of the grid under a small body's surface
 
@@ -61,6 +64,8 @@ class WarmUp:
     ----------
     *kinds : {"loop", "held", "pressed"}
         The real-time loop; a body that is held and moved along one direction; one that a ball presses.
+    body : Touchable, optional
+        Body whose own kernels somebody else compiles meanwhile; `seconds` counts them.
 
     Attributes
     ----------
@@ -68,9 +73,11 @@ class WarmUp:
         Time in s that it takes, about; 0 where nothing is to be done.
     """
 
-    def __init__(self, *kinds: str) -> None:
+    def __init__(self, *kinds: str, body: Touchable | None = None) -> None:
         cold = [kind for kind in kinds if not is_ready(_LAST[kind])]
         self.seconds = sum(SECONDS[kind] for kind in cold)
+        if body is not None and not is_ready(entry_of(body.energy.baseline.compiled()).one):
+            self.seconds = max(self.seconds, _BODY)
         self._process: subprocess.Popen[bytes] | None = None
         if cold:
             self._process = subprocess.Popen(
@@ -84,8 +91,8 @@ class WarmUp:
 
     @property
     def words(self) -> str:
-        """What a person is told meanwhile; "" where all is ready."""
-        if self._process is None or self._process.poll() is not None:
+        """The line for a person who waits; "" where all is ready."""
+        if self.seconds == 0 or (self._process is not None and self._process.poll() is not None):
             return ""
         return f"warming up, {self.seconds} s (kernels are compiled once on a machine)"
 
@@ -126,14 +133,19 @@ def main(kinds: Sequence[str]) -> None:
 
 
 def _compile_loop() -> None:
+    # meanwhile the loop's process compiles the rest of its body's energy, which waits for this part
+    _, _, felt, *_, grams, _, net = rod().energy.compiled()
+    second_order_into.translate(np.zeros(1), felt[0], felt[1:], grams, *net)
     measure_timing(0.01)
     compile_blend()
 
 
 def _compile_body(body: Surrogate) -> None:
-    """Ask a body as the loop and the page do."""
-    touched = touchable(body)
-    touched.evaluator()
+    """Ask a body as learning, the loop and the page do, in this order."""
+    network = body.energy.network
+    network.predict(np.zeros((FEW + 1, len(network.inputs))))
+    TrainedRegion.of(np.random.default_rng(0).uniform(-1.0, 1.0, (20, len(network.inputs))))
+    touchable(body).evaluator()
     for field in body.fields.values():
         if isinstance(field, FieldSurrogate):
             field.surface.at(np.zeros((FEW + 1, 3)))

@@ -12,7 +12,7 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.files import restore_folder
 from palpate.improvement import ImprovementStep, improve
 from palpate.improvement.improve import Interest
-from palpate.processes import CASE_LIMIT
+from palpate.options import ImprovementOptions, takes
 from palpate.study.run import (
     Log,
     Outcome,
@@ -30,22 +30,17 @@ from palpate.study.study_advice import earlier_curve
 
 __all__ = ["conclude", "improve_study"]
 
-MOST = 400
-"""Solves to learn from after which no further batch begins."""
 
-
+@takes(ImprovementOptions)
 def improve_study(
     study: Study,
     paths: Paths,
     *,
-    until: float = 0.02,
-    limit: float = float("inf"),
-    most: int = MOST,
     cluster: Any = None,
     interest: Interest | None = None,
     progress: Any = True,
-    case_limit: float = CASE_LIMIT,
     log: Log = lambda _: None,
+    options: ImprovementOptions,
 ) -> Iterator[ImprovementStep]:
     """Yield each step of `palpate.improve` for a study; its solves and surrogates are kept as the study's files.
 
@@ -53,10 +48,8 @@ def improve_study(
     ``NAME-SOLVES.palpate``, and the newest as ``NAME.palpate``; a step tells its file as `model_path`. All solves that
     ``[test]`` asks for have judged the surrogate by the time its error counts as reached.
 
-    `until` is the wanted relative force error at the 95th percentile of unseen solves; no further batch begins
-    after `limit` s or `most` solves; a single solve has failed after `case_limit` s. `interest` takes inputs (C, n)
-    of places and returns how much an error there counts, (C,), such as where a hand goes. `progress` is of each
-    batch.
+    Seed and workers are those of the study. `interest` takes inputs (C, n) of places and returns how much an error
+    there counts, (C,), such as where a hand goes. `progress` is of each batch.
     """
     if not isinstance(study.sweep, ProbeSweepRecord) or study.test is None:
         raise UsageError(
@@ -71,20 +64,15 @@ def improve_study(
     finished = Dataset.open(paths.data).ok if paths.data.exists() else None
     steps = improve(
         problem,
-        until=until,
-        limit=max(0.0, limit),
-        most=most,
+        options=replace(options, seed=study.sweep.seed, workers=study.sweep.workers),
         unseen=wanted["points"],
-        seed=study.sweep.seed,
         path=paths.data,
         unseen_path=paths.random,
         learner=lambda data, effort: learn_study(_with_effort(study, effort), data, log=log),
         known=_known(paths, finished),
-        workers=study.sweep.workers,
         cluster=cluster if cluster is not None else study.sweep.scheduler,
         interest=interest,
         progress=progress,
-        case_limit=case_limit,
         log=log,
     )
     for step in steps:

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from palpate import checks
 from palpate.errors import PalpateError, UsageError
 from palpate.file_kinds import PART_FORMATS, part_ending, part_kind, way_for
+from palpate.options import PartOptions, takes
 from palpate.physics.shapes.cad_file import states_unit
 from palpate.physics.shapes.mesh import Face
 from palpate.record_complaints import complaints
@@ -42,24 +42,14 @@ NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 LISTED = 20  # faces that the comments name, at most
 
 
-def part_study(
-    file: str | os.PathLike[str],
-    *,
-    unit: str | None = None,
-    young: float = YOUNG,
-    poisson: float = POISSON,
-    radius: float | None = None,
-    depth: float | None = None,
-    held: Sequence[str] = (),
-    touched: str | None = None,
-) -> tuple[Study, tuple[str, ...]]:
+@takes(PartOptions)
+def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[Study, tuple[str, ...]]:
     """Return a study of a part, and what its file holds as lines of text.
 
     The part is held at its flat face below, or where it has none at the lowest eighth of its height; it is pressed
     where it faces up. Probe and depth follow from its least extent, the material is neo-Hookean.
 
-    By default `unit` is mm, or m where mm can't be; between 1 and 5 in numbers it has to be said. `young` is in Pa;
-    the ball's `radius` and largest `depth` are in m. `held` and `touched` name surfaces of the file.
+    The `unit` is mm by default, or m where mm can't be; between 1 and 5 in numbers it has to be said.
     """
     path = Path(file)
     if not part_kind(path):
@@ -68,28 +58,30 @@ def part_study(
             why=f"Its name ends in {part_ending(path) or 'nothing'}.",
             fix=f"Give {PART_FORMATS}. {way_for(path)}".strip(),
         )
-    for what, length in (("The radius of the ball", radius), ("The depth of the ball", depth)):
-        if length is not None:
-            checks.positive(what, length, "m")
-    unit, faces = _read(path, unit)
+    unit, faces = _read(path, options.unit)
     low = np.min([face.lower for face in faces], axis=0)
     high = np.max([face.upper for face in faces], axis=0)
     footprint = float(np.prod((high - low)[:2]))
+    radius, touched = options.radius, options.touched
     if radius is None:
         least = float((high - low).min())
         radius = _nice(min(max(RADIUS * least, math.sqrt(footprint / CELLS) / COARSE), LARGEST * least))
     element = _nice(min(math.sqrt(footprint / CELLS), COARSE * radius))
-    deepest = _nice(DEPTH * radius) if depth is None else depth
+    deepest = _nice(DEPTH * radius) if options.depth is None else options.depth
     fixed, named = _support(faces, float(low[2]), float(high[2] - low[2]))
-    if held:
-        fixed, named = tuple(held), []
+    if options.held:
+        fixed, named = tuple(options.held), []
     content: dict[str, Any] = {
         "name": _study_name(_stem(path)),
         "body": {
             "kind": "part",
             "file": str(path),
             "unit": unit,
-            "material": {"young": young, "poisson": poisson, "name": "neo-Hookean"},
+            "material": {
+                "young": YOUNG if options.young is None else options.young,
+                "poisson": POISSON if options.poisson is None else options.poisson,
+                "name": "neo-Hookean",
+            },
             "fixed": fixed,
             "surfaces": named,
         },

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from palpate.errors import UsageError
-from palpate.learning import PRESETS, Refinement, Settings, recommended
+from palpate.learning import PRESETS, Settings, recommended
 from palpate.learning.pressed_solves import FEWEST
+from palpate.options import EnergyOptions, Options, Refinement, declared
 from palpate.records import Count, Metres, Newtons, Number, Record, Stiffness
 
 if TYPE_CHECKING:
@@ -35,6 +36,13 @@ __all__ = [
     "RuntimeRecord",
     "TouchTargetRecord",
 ]
+
+
+def _key(record: type[Options], name: str, **more: Any) -> Any:
+    """Return the key of a table that an option of a record is: its default, bounds and text."""
+    declaration = declared(record)[name]
+    ends = {"ge": declaration.least, "gt": declaration.above, "le": declaration.most, "lt": declaration.below}
+    return Field(declaration.default, description=declaration.text, **{**ends, **more})
 
 
 class _SweepRecord(Record):
@@ -180,10 +188,10 @@ class FilterRecord(Record):
 class LoadLearningRecord(Record):
     """The refinement, and the coupling at the held node."""
 
-    samples: Count = Field(26, ge=0, description="solves used for refinement; 0: all training solves")
-    units_max: Count = Field(6, ge=0, description="most units per network")
-    target: Number = Field(5e-7, ge=0.0, description="leave-one-out error at which growth stops")
-    starts: Count = Field(4, ge=1, description="starts per number of units")
+    samples: Count = _key(Refinement, "samples")
+    units_max: Count = _key(Refinement, "units_max")
+    target: Number = _key(Refinement, "target")
+    starts: Count = _key(Refinement, "starts")
     coupling: Stiffness | None = Field(
         None, description="between hand and node; left out: chosen from the data"
     )
@@ -197,22 +205,12 @@ class LoadLearningRecord(Record):
 class PadLearningRecord(Record):
     """The search for the network of the energy."""
 
-    effort: Number = Field(1.0, gt=0, description="multiplies the work of the search; 0.1 is a quick look")
-    seconds: Number | None = Field(
-        None,
-        gt=0,
-        description="limit on the time of learning; left out: none",
-        examples=[60.0],
-    )
-    workers: Count | None = Field(
-        None,
-        ge=1,
-        description="processes that search, with the same result; left out: one per core, eight at most",
-        examples=[2],
-    )
-    units_max: Count = Field(160, ge=0, description="most units of the energy, mirror images among them")
-    target: Number = Field(1e-3, ge=0.0, description="leave-one-out error at which growth stops")
-    seed: Count = Field(0, ge=0, description="decides the starts")
+    effort: Number = _key(EnergyOptions, "effort")
+    seconds: Number | None = _key(EnergyOptions, "seconds", examples=[60.0])
+    workers: Count | None = _key(EnergyOptions, "workers", examples=[2])
+    units_max: Count = _key(EnergyOptions, "units_max")
+    target: Number = _key(EnergyOptions, "target")
+    seed: Count = _key(EnergyOptions, "seed")
 
     def options(self) -> dict[str, Any]:
         """Return the options of `palpate.learn`."""

@@ -107,7 +107,7 @@ class EnergyEvaluator:
             As a call.
         """
         self(position, parameters)
-        return for_rows(trust_at, 1)(self._answer, *self._posterior)
+        return for_rows(trust_at, 1)(self._answer, *self._posterior)  # type: ignore[no-any-return]
 
     @property
     def energy(self) -> float:

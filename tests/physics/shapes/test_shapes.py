@@ -68,6 +68,7 @@ def test_the_surface_is_closed_and_faces_outwards(shape):
         mesh.points[0] = 0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape", SHAPES, ids=kind)
 def test_names_are_complete(shape):
     mesh = shape.rest()

@@ -77,6 +77,8 @@ class CrtkSimulator(ServiceDouble):
     latest message.
     """
 
+    faults: CrtkFaults
+
     def __init__(
         self, settings: CrtkSimulatorSettings | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:

@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -104,6 +105,8 @@ class HaplySimulator(ServiceDouble):
     copied. `faults` and `grips`, the inventory's entries by family, may be changed at any time. `received` counts
     messages on the simulation channel; `port`, `events_port` and `legacy_port` are in use once started.
     """
+
+    faults: SimulatorFaults
 
     def __init__(
         self,
@@ -260,41 +263,15 @@ def _xyz(vector: np.ndarray) -> dict[str, float]:
 
 
 def _inventory(settings: SimulatorSettings, devices: tuple[str, ...]) -> dict[str, Any]:
-    """Return the inventory of a service 3.5, as far as a driver needs it."""
-    zero, still = {"x": 0.0, "y": 0.0, "z": 0.0}, {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0}
-    wired = {
-        "device_id": "61021",
-        "config": {"type": "verse_grip"},
-        "state": {"orientation": still, "hall": 0, "button": False},
-    }
-    wireless = {
-        "device_id": "6F1A",
-        "config": {"type": "wireless_verse_grip"},
-        "state": {
-            "orientation": still,
-            "hall": 0,
-            "buttons": {"a": False, "b": False, "c": False},
-            "battery_level": 0.9,
-        },
-        "status": {"connected": True, "awake": True, "ready": True},
-    }
-    inverse3 = [
-        {
-            "device_id": name,
-            "config": {
-                "type": settings.kind,
-                "device_info": {"id": name, "major_version": 7, "minor_version": 4},
-                "handedness": "right",
-                "preset": "defaults",
-                "basis": {"permutation": "XYZ"},
-            },
-            "state": {"cursor_position": zero, "cursor_velocity": zero, "current_cursor_force": zero},
-            "status": {"ready": True, "started": True},
-        }
-        for name in devices
-    ]
-    return {
-        "inverse3": inverse3,
-        "verse_grip": [wired] if settings.grip in {"wired", "both"} else [],
-        "wireless_verse_grip": [wireless] if settings.grip in {"wireless", "both"} else [],
-    }
+    """Return the inventory of a service 3.5, as far as a driver needs it, with the devices and grips asked for."""
+    text = Path(__file__).with_name("haply_inventory.json").read_text(encoding="utf-8")
+    inventory: dict[str, Any] = json.loads(text)
+    (device,) = inventory["inverse3"]
+    device["config"]["type"] = settings.kind
+    inventory["inverse3"] = [copy.deepcopy(device) for _ in devices]
+    for entry, name in zip(inventory["inverse3"], devices, strict=True):
+        entry["device_id"] = entry["config"]["device_info"]["id"] = name
+    for kind in ("wired", "wireless"):
+        if settings.grip not in {kind, "both"}:
+            inventory["wireless_verse_grip" if kind == "wireless" else "verse_grip"] = []
+    return inventory

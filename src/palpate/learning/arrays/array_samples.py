@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.format import count
-from palpate.learning.automatic import check_target, ranges_of
+from palpate.learning.learn import ranges_of
 from palpate.network import Network, Scaling
 from palpate.network.radial import RadialFunction
 from palpate.rbf.freezing import training_record
@@ -19,7 +19,7 @@ from palpate.rbf.sample_checks import samples, spread_of
 from palpate.tables import column_names, columns_in_order, numbers_of
 from palpate.units import Quantity, Range
 
-__all__ = ["FEWEST", "ArrayProblem", "Samples", "check_search", "constant", "points"]
+__all__ = ["FEWEST", "ArrayProblem", "Samples", "constant", "points"]
 
 FEWEST = 20
 _MODES_MAX = 96
@@ -154,22 +154,6 @@ def points(X: Any, inputs: Sequence[Range], columns: Sequence[str] = ()) -> np.n
 def constant(Y: np.ndarray) -> bool:
     """Return true where no column of Y (N, m) changes by more than rounding."""
     return not bool((np.ptp(Y, axis=0) > 1e-13 * np.abs(Y).max()).any())
-
-
-def check_search(seed: Any, target: Any, level: Any) -> None:
-    """Refuse a target that is not positive, a seed that is no whole number, and a level that is no probability."""
-    if target is not None:
-        check_target(target)
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise UsageError(f"The seed is {seed!r}.", fix="Give a whole number, 0 or more.")
-    if not _is_number(level) or not 0 < level < 1:
-        raise UsageError(
-            f"A level of {level!r} is no probability.", fix="Choose one between 0 and 1, such as 0.9."
-        )
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float, np.number)) and not isinstance(value, (bool, np.complexfloating))
 
 
 def _numbers_and_names(

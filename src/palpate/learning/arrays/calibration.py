@@ -194,7 +194,6 @@ class Finish:
     problem: ArrayProblem
     trials: Sequence[Trial]
     began: float
-    seed: int
     level: float
     places: np.ndarray
     scales: np.ndarray

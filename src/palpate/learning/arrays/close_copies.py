@@ -21,6 +21,7 @@ from palpate.learning.folds import fold_masks, held_out, near_places
 from palpate.learning.kernel_layer import CENTRES_MAX, KernelLayer, likely_metric
 from palpate.learning.search import Trial
 from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.options import FitOptions
 
 __all__ = ["better_with_copies", "problem_without_copies"]
 
@@ -50,7 +51,7 @@ def problem_without_copies(samples: Samples) -> tuple[Samples, ArrayProblem, np.
     return some, alone, near_places(alone.X)
 
 
-def better_with_copies(fitted: Fitted, samples: Samples, some: Samples, seed: int, level: float) -> Fitted:
+def better_with_copies(fitted: Fitted, samples: Samples, some: Samples, options: FitOptions) -> Fitted:
     """Return the result of some samples, or a kernel layer of all where that misses far less at other places."""
     from scipy.spatial import KDTree
 
@@ -60,7 +61,7 @@ def better_with_copies(fitted: Fitted, samples: Samples, some: Samples, seed: in
     X, Y, rows = problem.X, problem.Y, np.array(some.rows)
     # without copies places are farther apart: copies too far to be left out are at one place here
     places = near_places(X[rows])[KDTree(X[rows]).query(X)[1]]
-    masks = fold_masks(places, _FOLDS, seed=seed)
+    masks = fold_masks(places, _FOLDS, seed=options.seed)
     layers = [
         CrossedLayers.of(likely_metric(name, X[rows], Y[rows], samples=_METRIC_SAMPLES), X, Y, masks)
         for name in RADIAL_FUNCTIONS
@@ -71,7 +72,7 @@ def better_with_copies(fitted: Fitted, samples: Samples, some: Samples, seed: in
     error = best.error / problem.unit
     trial = Trial("kernel", "kernel layer", best.layer.metric.radial, len(X), error, 0.0)
     trials = (*fitted.trials, trial)
-    finish = Finish(samples, problem, trials, 0.0, seed, level, places, best.layer.metric.scales)
+    finish = Finish(samples, problem, trials, 0.0, options.level, places, best.layer.metric.scales)
     return replace(finish.kernel_network(best), seconds=fitted.seconds)
 
 

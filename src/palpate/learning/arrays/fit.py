@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import FitWarning
-from palpate.learning.arrays.array_samples import ArrayProblem, Samples, check_search
+from palpate.learning.arrays.array_samples import ArrayProblem, Samples
 from palpate.learning.arrays.calibration import Finish
 from palpate.learning.arrays.close_copies import better_with_copies, problem_without_copies
 from palpate.learning.arrays.few_rows import best_of_few, few_places
@@ -43,6 +43,7 @@ from palpate.learning.kernel_layer import CENTRES_MAX, STARTS, KernelLayer, Metr
 from palpate.learning.pool import Pool
 from palpate.learning.search import Budget, Candidate, Trial, Work, evaluate_all
 from palpate.network.radial import RADIAL_FUNCTIONS
+from palpate.options import FitOptions, takes
 from palpate.rbf.forms import unit_form
 from palpate.rbf.refinement.refine import refine
 from palpate.rbf.regressors import Regressors
@@ -51,35 +52,35 @@ from palpate.units import Quantity, Range
 __all__ = ["fit"]
 
 _error = attrgetter("error")  # of a candidate, on held-out samples
-_WORK = 5e11  # multiplications at the default effort, which are half a minute's at most
-_SECONDS = 30.0  # that the default effort is made for: a shorter limit plans for less
-_NUMBERS = 1500  # unknowns in the units of a full-size candidate at the default effort
-_SMALL = 600  # and of one that is only looked at
-_METRIC_SAMPLES = 500  # for the likelihood
-_FOLDS, _ROUNDS = 5, 2  # of the networks learnt crosswise
-_LAYER_FOLDS = 10  # of a kernel layer: its final one learns from all samples, and fewer would say too much
-_STEPS = 15  # of a fold's own likelihood, from the metric of all
-_CROSSED_PLACES = 60  # of fewer no network was ever ahead of a Gaussian process
-_CROSSED_SHARE = 0.5  # of all work, for these
-_BEATEN = 1.3  # times the kernel layer's error: a mean of ten may still miss less
-_BEHIND = 1.2  # times the best error: too far for another ten iterations
-_ROUND_OFF = 1e-9  # of the outputs: nobody asks for less
-_HOPELESS = 3.0  # times the kernel layer's error after the first stages: no refinement will make up for that
+_WORK = 5e11  # multiplications at effort 1: half a minute at most
+_PLANNED_SECONDS = 30.0  # of that work: a shorter limit on time plans for less
+_FULL_NUMBERS, _LOOK_NUMBERS = (
+    1500,
+    600,
+)  # unknowns in the units of a candidate at effort 1, and at a first look
+_METRIC_SAMPLES = 500  # of which a likelihood is computed; its work goes with their cube
+_CROSSED_FOLDS, _CROSSED_ROUNDS = 5, 2  # of the networks learnt crosswise: ten in all
+_CROSSED_SHARE = 0.5  # of all work, for the networks learnt crosswise
+_CROSSED_PLACES = 60  # of fewer places no network was ever ahead of a Gaussian process
+_LAYER_FOLDS = (
+    10  # of a kernel layer: the final one learns from all samples, and fewer folds would say too much
+)
+_LAYER_STEPS = 15  # of the likelihood without a fold, from the metric of all samples
+_CLOSE_TO_LAYER = 1.3  # times the kernel layer's error: a mean of ten networks may still miss less
+_HOPELESS = 3.0  # times the kernel layer's error after the first stages: no refinement makes up for that
+_BEHIND = 1.2  # times the best form's error: too far for another run
+_ROUND_OFF = 1e-9  # of the outputs' spread: nobody asks for less
 
 
+@takes(FitOptions)
 def fit(
     X: Any,
     Y: Any,
     inputs: Sequence[Range] | None = None,
     outputs: Sequence[Quantity] | None = None,
     *,
-    effort: float = 1.0,
-    seconds: float | None = None,
-    workers: int = 1,
-    seed: int = 0,
-    target: float | None = None,
-    level: float = 0.9,
     lines: Sequence[int] | None = None,
+    options: FitOptions,
 ) -> Fitted:
     """Choose and fit a network from samples alone.
 
@@ -95,22 +96,6 @@ def fit(
         Of the data if left out, named x0, x1, … or as a table's columns are.
     outputs : sequence of m quantities, optional
         Named y0, y1, … if left out.
-    effort : float
-        Multiplies the work of the search, which takes about half a minute on one core at the default of 1, and up to
-        a minute for more than 10,000 samples; 0.1 gives a quick look. The result depends on it, never on how fast or
-        busy the machine is.
-    seconds : float, optional
-        Limit on time; by default none. A limit below 30 plans for as much less work, and what still takes longer on
-        this machine is left out: the result then depends on the machine.
-    workers : int
-        Processes that refine networks at a time, and threads that add up many samples; the result is the same with
-        any number.
-    seed : int
-        Decides everything that is drawn.
-    target : float, optional
-        Held-out error relative to the outputs' standard deviation that is good enough.
-    level : float
-        Share of unseen samples that the intervals are to hold.
     lines : sequence of N int, optional
         Line of each sample in the file that it comes from; notes name a sample by it. By default they name its row
         in X, counted from 0.
@@ -140,24 +125,23 @@ def fit(
     from threadpoolctl import threadpool_limits
 
     began = time.monotonic()
-    budget = Budget.of(effort, seconds)
-    check_search(seed, target, level)
+    budget, seconds = Budget.of(options.effort, options.seconds), options.seconds
     samples = Samples.of(X, Y, inputs, outputs, lines)
     if seconds is not None:  # fitting to all samples and freezing come after the search
-        budget = Budget(min(budget.effort, seconds / _SECONDS), began + 0.85 * seconds)
+        budget = Budget(min(budget.effort, seconds / _PLANNED_SECONDS), began + 0.85 * seconds)
     with threadpool_limits(1):  # small matrices: threads would cost more than they bring
         some, problem, places = problem_without_copies(samples)
-        options = some, problem, places, began, budget, Pool(workers), seed, target, level
+        context = some, problem, places, began, budget, options
         if len(places) > MANY_ROWS:
-            fitted = _Chooser(*options, RowParts.of(places, seed)).chosen_for_many(workers)
+            fitted = _Chooser(*context, RowParts.of(places, options.seed)).chosen_for_many()
         else:
-            chooser = _Chooser(*options)
+            chooser = _Chooser(*context)
             fitted = chooser.chosen_of_few() if few_places(places) else chooser.chosen()
-            fitted = better_with_copies(fitted, samples, some, seed, level)
+            fitted = better_with_copies(fitted, samples, some, options)
     fitted = replace(fitted, columns=samples.columns)
     for note in fitted.notes:
         if not note.startswith(IDLE):
-            warnings.warn(note, FitWarning, stacklevel=2)
+            warnings.warn(note, FitWarning, stacklevel=3)
     return fitted
 
 
@@ -171,19 +155,19 @@ class _Chooser:
         places: np.ndarray,
         began: float,
         budget: Budget,
-        pool: Pool,
-        seed: int,
-        target: float | None,
-        level: float,
+        options: FitOptions,
         parts: RowParts | None = None,
     ) -> None:
-        self.problem, self.seed, self.pool = problem, seed, pool
+        self.problem, self.options = problem, options
+        self.seed, self.pool = options.seed, Pool(options.workers)
         self.parts = parts  # of many rows some are chosen by, in half of the time
         rows = slice(None) if parts is None else parts.learn[:SUBSET]
         self.budget = budget if parts is None else budget.part(0.5)
         self.deadline = budget.deadline
         self.X, self.Y, self.places = problem.X[rows], problem.Y[rows], places[rows]
-        self.target = max(target or 0.0, _ROUND_OFF) * problem.unit  # per latent output, as all errors
+        self.target = (
+            max(options.target or 0.0, _ROUND_OFF) * problem.unit
+        )  # per latent output, as all errors
         self.total = _WORK * budget.effort
         self.work = Work(self.total, self.budget.deadline)
         self.size = min(2.0, math.sqrt(budget.effort))
@@ -191,11 +175,11 @@ class _Chooser:
         self.split = self._fold(0)
         self.scales, self.known_scales = np.ones(self.X.shape[1]), False
         self.centres = int(np.clip((0.15 * self.total) ** (1 / 3), 300, CENTRES_MAX))
-        self._layer = partial(KernelLayer.fit, seed=seed, most=self.centres)
+        self._layer = partial(KernelLayer.fit, seed=self.seed, most=self.centres)
         self.trials: list[Trial] = []
         self.ran: list[Candidate] = []
         self.reserve = _CROSSED_SHARE * self.total  # for the networks learnt crosswise
-        self._finish_with = partial(Finish, samples, problem, self.trials, began, seed, level, places)
+        self._finish_with = partial(Finish, samples, problem, self.trials, began, options.level, places)
 
     def chosen(self) -> Fitted:
         tail = self._tail()
@@ -203,7 +187,7 @@ class _Chooser:
             return self._single(tail, form="affine")
         metric, mark = self._kernel()
         winner = self._winner(mark)
-        behind = winner.error > max(_BEATEN * mark, self.target) or winner.error > _HOPELESS * mark
+        behind = winner.error > max(_CLOSE_TO_LAYER * mark, self.target) or winner.error > _HOPELESS * mark
         if winner.network is None or behind:
             return self._kernel_network(metric, mark)
         self.reserve = 0.0
@@ -224,12 +208,12 @@ class _Chooser:
         if best.error > self.target and len(np.unique(self.places)) >= _CROSSED_PLACES:
             winner = self._winner(mark := float(np.sqrt((best.missed[self.split.held] ** 2).mean())))
             self.reserve = 0.0
-            crossed = self._finalist(winner) if winner.error <= _BEATEN * mark else None
+            crossed = self._finalist(winner) if winner.error <= _CLOSE_TO_LAYER * mark else None
             if crossed is not None and crossed.clearly_ahead(best.missed):
                 return self._last_stage.mean_network(crossed)
         return self._last_stage.few_network(best)
 
-    def chosen_for_many(self, workers: int) -> Fitted:
+    def chosen_for_many(self) -> Fitted:
         """Return the network whose kind the subset decides, and whose units and weights learn from all rows."""
         assert self.parts is not None
         structure = Structure(self._tail())
@@ -240,7 +224,7 @@ class _Chooser:
             *(self.problem, self.parts, self.work.extended(self.total, self.deadline)),
             seed=self.seed,
             target=self.target,
-            workers=workers,
+            workers=self.options.workers,
             deadline=self.deadline,
             trials=self.trials,
         )
@@ -249,7 +233,7 @@ class _Chooser:
     def _winner(self, mark: float) -> Candidate:
         """Return the best form, radial function and size, refined where the kernel layer is not far ahead."""
         winner = self._radials(*self._forms(mark))
-        if winner.theta.size < 0.6 * _NUMBERS * self.size:
+        if winner.theta.size < 0.6 * _FULL_NUMBERS * self.size:
             winner = self._sizes(winner)
         if self.target < winner.error <= _HOPELESS * mark:
             winner = self._run([winner], round(120 * self.size), self.split)[0]
@@ -359,14 +343,14 @@ class _Chooser:
         )
         if len(metrics) == 1 or self.budget.over:
             return best
-        self.work.spend(len(masks) * 2.0 * _STEPS * samples**3)
-        return CrossedLayers.of(best.layer.metric, self.X, self.Y, masks, steps=_STEPS)
+        self.work.spend(len(masks) * 2.0 * _LAYER_STEPS * samples**3)
+        return CrossedLayers.of(best.layer.metric, self.X, self.Y, masks, steps=_LAYER_STEPS)
 
     def _forms(self, mark: float) -> tuple[Candidate, Candidate]:
         """Return the form that does best, at full size if a look needs less, and it before its last run."""
         few = self.split.first(LOOK_SAMPLES)
         names = forms_for(self.X.shape[1])
-        looks = self._run([self._enter(name, _SMALL) for name in names], 20, few)
+        looks = self._run([self._enter(name, _LOOK_NUMBERS) for name in names], 20, few)
         best = _best_of(looks)
         # a form that leads by far, and leads the kernel layer too, has won; else the larger size tells
         far = 2.0 if best.error < mark else 3.0
@@ -374,7 +358,7 @@ class _Chooser:
         # rotated units show what they can do only when there are many: they and the best other go on
         others = [one for one in kept if one.kind[0] != "rotated"][:1]
         kept = others + [one for one in kept if one.kind[0] == "rotated"]
-        larger = [self._enter(one.kind[0], _NUMBERS) for one in kept]
+        larger = [self._enter(one.kind[0], _FULL_NUMBERS) for one in kept]
         larger = [new for new, old in zip(larger, kept, strict=True) if len(new.theta) > 1.5 * len(old.theta)]
         grown = self._run(larger, 10, few) if larger else []
         if not grown or grown[0].network is None:
@@ -433,7 +417,7 @@ class _Chooser:
         """Return the networks of the best kind, learnt crosswise: the winner's, or a rival's if work allows."""
         best = self._learn_crosswise(winner)
         for rival in self._rivals(winner) if best is not None else ():
-            if self.work.left < 1.3 * _ROUNDS * _FOLDS * self._fresh(rival).work(self.split):
+            if self.work.left < 1.3 * _CROSSED_ROUNDS * _CROSSED_FOLDS * self._fresh(rival).work(self.split):
                 break
             other = self._learn_crosswise(self._run([rival], rival.iterations, self.split, record=False)[0])
             if other is not None and best is not None and other.error < best.error:
@@ -454,11 +438,13 @@ class _Chooser:
         Each stops by other samples than those that it is judged by: on a handful the best iterate is there by luck.
         """
         fresh = self._fresh(winner)
-        rounds = min(_ROUNDS, int(self.work.left / (1.1 * _FOLDS * fresh.work(self.split))))
+        rounds = min(_CROSSED_ROUNDS, int(self.work.left / (1.1 * _CROSSED_FOLDS * fresh.work(self.split))))
         if rounds < 1:
             return None
         masks = [
-            (k, mask) for k in range(rounds) for mask in fold_masks(self.places, _FOLDS, seed=self.seed + k)
+            (k, mask)
+            for k in range(rounds)
+            for mask in fold_masks(self.places, _CROSSED_FOLDS, seed=self.seed + k)
         ]
         wholes = [
             HeldOut.without(self.X, self.Y, mask, seed=self.seed + i) for i, (_, mask) in enumerate(masks)
@@ -471,7 +457,7 @@ class _Chooser:
                 networks.append(refit_weights(one.network, whole.X, whole.Y, RIDGE))
                 unseen.append(mask)
                 own.append(k)
-        if len(networks) < _FOLDS:  # a limit on time
+        if len(networks) < _CROSSED_FOLDS:  # a limit on time
             return None
         crossed = Crossed(tuple(networks), np.array(unseen), np.array(own), self.X, self.Y).without_strays()
         units = sum(len(network.theta) for network in crossed.networks)

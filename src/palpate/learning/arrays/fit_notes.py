@@ -15,16 +15,17 @@ if TYPE_CHECKING:
 
 __all__ = ["IDLE", "notes_on", "wild_note", "wild_rows"]
 
-_NO_BETTER = (
-    0.95  # of the outputs' standard deviation: a network that misses so much says no more than their mean
-)
+# of the outputs' standard deviation: a network that misses so much says no more than their mean
+_NO_BETTER = 0.95
 _WILD = 12.0  # robust standard deviations: once in 10³² samples of a normal law
 _GROSS = 0.5  # of the outputs' spread: what misses less is a corner that is hard to learn
-_FEW = 0.02  # of the samples may be called wild; where more are, their law has long tails
-_ENOUGH = 50  # errors: among fewer a corner that is hard to learn looks wild
-_SMALL = 1e-3  # of the largest output's spread: learnt to the large ones' scale it is as good as not learnt
+_MOST_WILD = 0.02  # of the samples: where more are far off, their law has long tails
+_FEWEST_ERRORS = 50  # among fewer a corner that is hard to learn looks wild
+_SMALL_OUTPUT = (
+    1e-3  # of the largest output's spread: learnt to the large ones' scale it is as good as not learnt
+)
 _IRRELEVANT = 0.02  # of the largest scale of an input
-_LISTED = 5
+_LISTED = 5  # outputs that a note names
 IDLE = "Inputs that hardly matter:"  # not worth a warning
 
 
@@ -73,14 +74,14 @@ def wild_note(rows: Sequence[int], count: int, lines: Sequence[int] | None = Non
 
 def wild_rows(missed: np.ndarray) -> np.ndarray:
     """Return which rows of errors (J, m) at unseen samples are wild beside all others."""
-    if len(missed) < _ENOUGH:
+    if len(missed) < _FEWEST_ERRORS:
         return np.zeros(0, dtype=int)
     size = np.abs(missed)
     typical = np.median(size, axis=0) / 0.6745
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.where((typical > 0) & (size > _GROSS), size / typical, 0.0).max(axis=1)
     rows = np.flatnonzero(off > _WILD)
-    return rows if len(rows) <= max(1, _FEW * len(missed)) else np.zeros(0, dtype=int)
+    return rows if len(rows) <= max(1, _MOST_WILD * len(missed)) else np.zeros(0, dtype=int)
 
 
 def _passed_over(samples: Samples, problem: ArrayProblem) -> list[str]:
@@ -89,7 +90,7 @@ def _passed_over(samples: Samples, problem: ArrayProblem) -> list[str]:
     varied = np.ptp(samples.Y, axis=0) > 1e-12 * np.abs(samples.Y).max(axis=0)  # not by round-off alone
     small = [
         q.name
-        for q, few in zip(samples.outputs, varied & (spread < _SMALL * spread.max()), strict=True)
+        for q, few in zip(samples.outputs, varied & (spread < _SMALL_OUTPUT * spread.max()), strict=True)
         if few
     ]
     if not small or len(small) > len(spread) / 2:

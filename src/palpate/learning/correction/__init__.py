@@ -17,10 +17,9 @@ from palpate.learning.correction.corrector import Corrector, Event
 from palpate.learning.correction.load_cell import LoadCell
 from palpate.learning.correction.measures import ForceError, force_error
 from palpate.learning.correction.phantom import Phantom
-from palpate.learning.correction.prior import Discrepancy
 from palpate.learning.correction.probe_positions import probe_positions
 from palpate.learning.correction.specimen_posterior import SpecimenPosterior
-from palpate.learning.correction.touches import Noise
+from palpate.options import Discrepancy, Noise
 
 __all__ = [
     "Correction",

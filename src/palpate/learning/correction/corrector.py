@@ -19,9 +19,10 @@ from threadpoolctl import threadpool_limits
 from palpate.errors import UsageError
 from palpate.learning.correction.corrected_surrogate import corrected_surrogate
 from palpate.learning.correction.load_cell import LoadCell, cell_from_residuals
-from palpate.learning.correction.prior import Discrepancy, add_broad_units, specimen_prior
+from palpate.learning.correction.prior import add_broad_units, specimen_prior
 from palpate.learning.correction.specimen_posterior import SpecimenPosterior
-from palpate.learning.correction.touches import Noise, Touches
+from palpate.learning.correction.touches import Touches
+from palpate.options import Discrepancy, Noise
 from palpate.surrogates import ContactBaseline, Surrogate
 from palpate.units import bounds
 

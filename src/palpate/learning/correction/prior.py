@@ -21,57 +21,15 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.network import Network
 from palpate.network.radial import radial
+from palpate.options import Discrepancy
 from palpate.surrogates import LearntEnergy
 
-__all__ = ["Discrepancy", "SpecimenPrior", "add_broad_units", "regressors", "specimen_prior"]
+__all__ = ["SpecimenPrior", "add_broad_units", "regressors", "specimen_prior"]
 
 _KEPT = 1e-5  # of the largest variance: directions of the slow change below it are left out
 _MOST = 80  # such directions
 _POINTS = 256  # places at least where the slow change is matched
 _RIDGE = 1e-6  # of a regressor's mean square
-
-
-@dataclass(frozen=True)
-class Discrepancy:
-    """Standard deviations of what a specimen differs by.
-
-    Attributes
-    ----------
-    constant : float
-        σ_c of ln κ: 0.5 means that a factor between 0.6 and 1.6 is ordinary.
-    varying : float
-        σ_v of ln κ.
-    length : float
-        L over which it varies, in halves of the inputs' ranges.
-    offset : float
-        σ_o, m; zero where the surface's height is known.
-    units : int
-        Broad units that are added at most; they make each answer of the corrected surrogate slower.
-
-    Raises
-    ------
-    UsageError
-        If one of them is negative or not finite, or the length not positive.
-    """
-
-    constant: float = 0.5
-    varying: float = 0.3
-    length: float = 0.5
-    offset: float = 5e-4
-    units: int = 64
-
-    def __post_init__(self) -> None:
-        sizes = (self.constant, self.varying, self.offset)
-        if not (
-            all(math.isfinite(v) and v >= 0 for v in (*sizes, self.units))
-            and self.length > 0
-            and math.isfinite(self.length)
-        ):
-            raise UsageError(
-                f"{self} says nothing of a specimen.",
-                why="Standard deviations are not negative, and a length is positive.",
-                fix="Set to zero what is known, to its typical size what is not.",
-            )
 
 
 @dataclass(frozen=True, eq=False)

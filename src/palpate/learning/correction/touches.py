@@ -12,68 +12,35 @@ F is not linear in θ, so the rows are taken anew wherever θ goes. They are whi
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from palpate.errors import UsageError
 from palpate.learning.correction.prior import SpecimenPrior, regressors
+from palpate.options import Noise
 from palpate.surrogates import ContactBaseline, ContactLaw, LearntEnergy
 from palpate.surrogates.continuation import saturated
 from palpate.units import bounds
 
-__all__ = ["Noise", "Touches"]
+__all__ = ["Touches"]
 
 _ARRAYS = ("depth", "normal", "base", "lines", "measured", "whitening")
 _FARTHEST = 30.0  # of a change of ℓ: e³⁰ times the model's force is nobody's specimen
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Standard deviations of one measured component of a force.
-
-    Attributes
-    ----------
-    absolute : float
-        σ_a, N.
-    relative : float
-        σ_r, of the measured force's size.
-    position : float
-        σ_x of each coordinate of the probe, m; it counts through the stiffness.
-
-    Raises
-    ------
-    UsageError
-        If one of them is negative or not finite, or the absolute one is not positive.
-    """
-
-    absolute: float = 0.005
-    relative: float = 0.01
-    position: float = 0.0
-
-    def __post_init__(self) -> None:
-        sizes = (self.absolute, self.relative, self.position)
-        if not (all(math.isfinite(v) and v >= 0 for v in sizes) and self.absolute > 0):
-            raise UsageError(
-                f"{self} is no noise of a force sensor.",
-                why="A force near zero has a resolution too.",
-                fix="Give the sensor's resolution in N as `absolute`, its calibration error as `relative`.",
-            )
-
-    def whitening(self, force: np.ndarray, stiffness: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """W (N, 3, 3): W (measured − F) has unit variance; rows of zeros where a component is not measured."""
-        size = (force**2).sum(axis=1)
-        C = (self.absolute**2 + self.relative**2 * size)[:, None, None] * np.eye(3)
-        C = C + self.position**2 * stiffness @ stiffness.transpose(0, 2, 1)
-        W = np.linalg.inv(np.linalg.cholesky(C))
-        one = along.any(axis=1)
-        own = np.einsum("ni,nij,nj->n", along, C, along)[one]
-        W[one] = 0.0
-        W[one, 0] = along[one] / np.sqrt(own)[:, None]
-        return np.asarray(W)
+def _whitening(noise: Noise, force: np.ndarray, stiffness: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """W (N, 3, 3): W (measured − F) has unit variance; rows of zeros where a component is not measured."""
+    size = (force**2).sum(axis=1)
+    C = (noise.absolute**2 + noise.relative**2 * size)[:, None, None] * np.eye(3)
+    C = C + noise.position**2 * stiffness @ stiffness.transpose(0, 2, 1)
+    W = np.linalg.inv(np.linalg.cholesky(C))
+    one = along.any(axis=1)
+    own = np.einsum("ni,nij,nj->n", along, C, along)[one]
+    W[one] = 0.0
+    W[one, 0] = along[one] / np.sqrt(own)[:, None]
+    return np.asarray(W)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +78,7 @@ class Touches:
         assert isinstance(baseline, ContactBaseline)
         _, normal, _ = baseline.touched.at(np.ascontiguousarray(X[:, :3]))
         depth = baseline.coordinate(X)
-        W = noise.whitening(force, energy.stiffness(X), along)
+        W = _whitening(noise, force, energy.stiffness(X), along)
         return cls(
             depth, normal, base, scale * both @ prior.root, force.copy(), W, baseline.law, prior.offset
         )

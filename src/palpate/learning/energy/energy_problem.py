@@ -28,20 +28,16 @@ from palpate.rbf.refinement.rows import Rows
 from palpate.rbf.regressors import Regressors
 from palpate.rbf.symmetric_units import Images, SymmetricRegressors
 
-__all__ = ["TOLERANCE", "EnergyProblem", "LeftOut"]
+__all__ = ["EnergyProblem", "LeftOut"]
 
-TOLERANCE = 1e-5  # relative; of data that bear noise
 _RIDGE = 3e-6  # with 1e-10 some networks bend wildly between solves, with 1e-4 all miss more
-_MOST = 0.98  # leverage; what a solve decides alone is judged by fifty times its residual
-_ALL_OVER = 8.0  # times the finest: a unit that is nowhere wider stands on one solve
-_AGAIN = (
-    30,
-    0,
-)  # iterations after narrow units are taken out, once and again; with none there can't be new ones
+_LARGEST_LEVERAGE = 0.98  # what a solve decides alone is judged by fifty times its residual
+_NARROW_ALL_OVER = 8.0  # widths of the finest unit: one that is nowhere wider stands on one solve
+# iterations after narrow units are taken out, once and again; with none there can't be new ones
+_ITERATIONS_WITHOUT_NARROW = (30, 0)
 _FOLDS = 8
-_FOLD_ITERATIONS = (
-    20  # with 60 of ten solves the errors are up to 1.8 times larger, and order networks no better
-)
+# with 60 iterations the errors of ten solves are up to 1.8 times larger, and order networks no better
+_FOLD_ITERATIONS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +73,7 @@ class EnergyProblem:
     ridge: float = _RIDGE  # penalty on weights
     # (n,), scaled: the shortest way over which a unit may change, 0 for any; None where all are
     finest: np.ndarray | None = None
-    tolerance: float = TOLERANCE  # relative gain per step of the refinement below which it ends
+    tolerance: float = 1e-5  # relative gain per step of the refinement below which it ends
 
     def regressors(self, form: str, radial: RadialFunction) -> Regressors:
         """Return the regressors of a form, with their images where there is a symmetry."""
@@ -100,7 +96,7 @@ class EnergyProblem:
         others costs nothing where solves are left out, and makes the force ripple between them.
         """
         network = self.refined(candidate.theta, candidate.regressors, iterations=iterations, seconds=seconds)
-        for more in _AGAIN:
+        for more in _ITERATIONS_WITHOUT_NARROW:
             narrow = self.narrow_units(network)
             if not narrow.any():
                 break
@@ -139,7 +135,7 @@ class EnergyProblem:
         factors = network.regressors.form.factors(network.theta)[0][:, :, felt] * self.finest[felt]
         sharpness = np.linalg.svd(factors, compute_uv=False)
         all_over = sharpness.shape[1] == felt.sum()
-        return np.asarray((sharpness[:, 0] > 1.0) | (all_over & (sharpness[:, -1] > 1.0 / _ALL_OVER)))
+        return np.asarray((sharpness[:, 0] > 1.0) | (all_over & (sharpness[:, -1] > 1.0 / _NARROW_ALL_OVER)))
 
     def fitted(self, network: Refined) -> tuple[Rows, Fit]:
         """Return the least-squares problem of a network's units, and its solution."""
@@ -153,7 +149,9 @@ class EnergyProblem:
         if network.theta.size + len(fit.tau) >= len(rows.targets):
             return LeftOut(rows, fit, np.full(rows.targets.shape, np.inf), rows.groups)
         span = span_of_units(rows, network.theta, fit) if len(network.theta) else None
-        return LeftOut(rows, fit, leave_one_out_row_errors(rows, fit, basis=span, most=_MOST), rows.groups)
+        return LeftOut(
+            rows, fit, leave_one_out_row_errors(rows, fit, basis=span, most=_LARGEST_LEVERAGE), rows.groups
+        )
 
     def folds(self, groups: np.ndarray) -> np.ndarray:
         """Return the fold (N,) of every solve; of a single group the groups themselves."""

@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import cast
 
 import numpy as np
 
@@ -22,27 +22,23 @@ from palpate.learning.pool import Pool
 from palpate.learning.search import Budget, Candidate, Search, Trial, sizes
 from palpate.learning.starts import random_units
 from palpate.network.radial import RadialFunction
+from palpate.options import EnergyOptions, takes
 from palpate.rbf.regressors import Regressors
 
 __all__ = ["EnergyEnsemble", "best_mean", "score", "search_energy"]
 
 _FORMS = ("rotated", "axis-aligned", "rank-2")  # the last for more inputs than the position
 _RADIALS: tuple[RadialFunction, ...] = ("inverse-multiquadric", "matern-5/2", "gaussian")
-_FIRST = 6  # units by which kinds are compared
-_ITERATIONS = 120
-_KIND_ITERATIONS = 60
-_KIND_STARTS = 2
-_GROWN = 3  # kinds that grow
-_PATIENCE = 3  # sizes without a gain
-_RANDOM = (
-    24  # further starts, of up to so many solves as follow; of more they go with the root of their number
-)
-_SOLVES = 40
-_ROUNDS = (50, 100)  # iterations of these, the better half going on
-_SAME_KIND = 0.5  # share of them of the best one's kind, so that a mean has some to choose from
-_SPREAD = (0.7, 1.5)  # their sizes over that of the best
-_CROSS_VALIDATED = 20  # networks
-_UNITS = 320  # of a mean, images counted: a query costs about 25 ns for each
+_KIND_UNITS, _KIND_STARTS, _KIND_ITERATIONS = 6, 2, 60  # of the networks by which kinds are compared
+_GROWN_KINDS, _GROWTH_ITERATIONS = 3, 120
+_PATIENCE = 3  # sizes without a gain, after which growth ends
+_FEW_SOLVES = 40  # can't tell more networks apart; of more solves counts grow with the root of their number
+_RANDOM_STARTS = 24  # of few solves
+_ROUNDS = (50, 100)  # iterations of random starts, the better half going on
+_SAME_KIND = 0.5  # share of random starts of the best one's kind, so that a mean has some to choose from
+_RELATIVE_SIZES = (0.7, 1.5)  # of random starts, over the units of the best network
+_CROSS_VALIDATED = 20  # networks that are refined again without a fold, of few solves
+_MEAN_UNITS = 320  # of a mean, images counted: a query costs about 25 ns for each
 _SCATTER = 0.05  # of random units about the solves, in scaled inputs
 _SEARCH_SHARE = 0.65  # of a limit on time; the rest is for judging
 
@@ -56,36 +52,24 @@ class EnergyEnsemble(Ensemble):
     error: float  # geometric mean over solves of what is missed by refining again and by the closed form
 
 
+@takes(EnergyOptions)
 def search_energy(
-    problem: EnergyProblem,
-    *,
-    form: str = "auto",
-    radial: RadialFunction | Literal["auto"] = "auto",
-    units_max: int = 160,
-    networks: int = 12,
-    target: float = 1e-3,
-    budget: Budget | None = None,
-    workers: int | None = None,
-    seed: int = 0,
+    problem: EnergyProblem, *, options: EnergyOptions, budget: Budget | None = None
 ) -> tuple[EnergyEnsemble, tuple[Trial, ...]]:
-    """Return the mean of at most so many networks, and the records of all that were tried.
-
-    `units_max` counts the images of one network's units; at the leave-one-solve-out error `target` no more are added.
-    "auto" tries several forms and radial functions.
-    """
-    budget, pool = budget or Budget(), Pool(workers)
+    """Return the mean of the best networks, and the records of all that were tried."""
+    budget, pool = budget or Budget(), Pool(options.workers)
     search = Search(problem, budget.part(_SEARCH_SHARE), pool)
-    _search_structure(search, form, radial, units_max, target, seed)
+    _search_structure(search, options)
     order = sorted(search.tried, key=lambda one: one.error)[
-        : budget.count(_CROSS_VALIDATED * _more(problem), 2)
+        : budget.count(_CROSS_VALIDATED * _worthwhile(problem), 2)
     ]
     scored = pool.map(partial(_score_in_time, problem, budget.deadline), list(enumerate(order)))
-    ensemble = best_mean(problem, [one for one in scored if one is not None], networks)
+    ensemble = best_mean(problem, [one for one in scored if one is not None], options.networks)
     return ensemble, search.trials
 
 
 def best_mean(
-    problem: EnergyProblem, scored: Sequence[ScoredNetwork], most: int, units: int = _UNITS
+    problem: EnergyProblem, scored: Sequence[ScoredNetwork], most: int, units: int = _MEAN_UNITS
 ) -> EnergyEnsemble:
     """Return the mean of at most so many scored networks, of no more than so many units, that misses least."""
     rows = problem.fitted(scored[0].network)[0]
@@ -118,45 +102,38 @@ def _score_in_time(
     return score(problem, candidate, max(left, 0.1)) if left > 0 or number == 0 else None
 
 
-def _search_structure(
-    search: Search,
-    form: str,
-    radial: RadialFunction | Literal["auto"],
-    units_max: int,
-    target: float,
-    seed: int,
-) -> None:
+def _search_structure(search: Search, options: EnergyOptions) -> None:
     """Try every kind of unit at one size, grow the best, and try random starts about the best size."""
     problem, budget = search.problem, search.budget
     assert isinstance(problem, EnergyProblem)
-    starts = _Starts(problem, units_max, seed)
-    kinds = [problem.regressors(*kind) for kind in _kinds(form, radial, problem.X.shape[1])]
+    starts = _Starts(problem, options.units_max, options.seed)
+    kinds = [problem.regressors(*kind) for kind in _kinds(options, problem.X.shape[1])]
     best_of_kinds = search.try_all(
-        (starts.random(kind, _FIRST, "kind") for kind in kinds for _ in range(_KIND_STARTS)),
+        (starts.random(kind, _KIND_UNITS, "kind") for kind in kinds for _ in range(_KIND_STARTS)),
         budget.count(_KIND_ITERATIONS, 10),
     )
     best_of_kinds.sort(key=lambda one: one.error)
     best_of_kinds = list({one.kind: one for one in reversed(best_of_kinds)}.values())[::-1]
-    iterations = budget.count(_ITERATIONS, 10)
-    for one in best_of_kinds[:_GROWN]:
+    iterations = budget.count(_GROWTH_ITERATIONS, 10)
+    for one in best_of_kinds[:_GROWN_KINDS]:
         ladder = sizes(max(len(one.theta), 2), starts.most(one.regressors))
         search.grow(
             partial(starts.grown, one.regressors),
             ladder,
             iterations,
             begin=one,
-            target=target,
+            target=options.target,
             patience=_PATIENCE,
         )
     best = search.best
-    if best.error <= target or not len(best.theta):
+    if best.error <= options.target or not len(best.theta):
         return
-    rng = np.random.default_rng([seed, len(best_of_kinds)])
+    rng = np.random.default_rng([options.seed, len(best_of_kinds)])
     further = []
-    for _ in range(budget.count(_RANDOM * _more(problem), 0)):
+    for _ in range(budget.count(_RANDOM_STARTS * _worthwhile(problem), 0)):
         another = best_of_kinds[int(rng.integers(min(3, len(best_of_kinds))))]
         regressors = (best if rng.random() < _SAME_KIND else another).regressors
-        units = max(1, round(len(best.theta) * rng.uniform(*_SPREAD)))
+        units = max(1, round(len(best.theta) * rng.uniform(*_RELATIVE_SIZES)))
         further.append(starts.random(regressors, units, "random"))
     if further:
         search.halve(further, [budget.count(k, 5) for k in _ROUNDS])
@@ -191,15 +168,13 @@ class _Starts:
         return random_units(regressors.form, self.problem.X, max(count, 0), rng, scatter=_SCATTER)
 
 
-def _more(problem: EnergyProblem) -> float:
+def _worthwhile(problem: EnergyProblem) -> float:
     """Return how many times more networks are worth trying than of few solves, which can't tell them apart."""
-    return max(1.0, math.sqrt(len(problem.X) / _SOLVES))
+    return max(1.0, math.sqrt(len(problem.X) / _FEW_SOLVES))
 
 
-def _kinds(
-    form: str, radial: RadialFunction | Literal["auto"], inputs: int
-) -> list[tuple[str, RadialFunction]]:
+def _kinds(options: EnergyOptions, inputs: int) -> list[tuple[str, RadialFunction]]:
     """Return forms and radial functions to try: the first of each list with all of the other."""
-    forms = [f for f in _FORMS if f != "rank-2" or inputs > 3] if form == "auto" else [form]
-    radials = list(_RADIALS) if radial == "auto" else [radial]
+    forms = [f for f in _FORMS if f != "rank-2" or inputs > 3] if options.form == "auto" else [options.form]
+    radials = list(_RADIALS) if options.radial == "auto" else [cast(RadialFunction, options.radial)]
     return [(forms[0], r) for r in radials] + [(f, r) for f in forms[1:] for r in radials[:2]]

@@ -6,22 +6,21 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from palpate.errors import UsageError
 from palpate.format import share
 from palpate.learning.energy.energy_export import export_network, trained_region, training_meta
 from palpate.learning.energy.energy_images import images_of
-from palpate.learning.energy.energy_problem import TOLERANCE, EnergyProblem
+from palpate.learning.energy.energy_problem import EnergyProblem
 from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.learning.energy.energy_search import search_energy
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.search import Budget, Candidate, Search, Trial
 from palpate.learning.starts import random_units
-from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction
+from palpate.options import EnergyOptions, takes
 from palpate.rbf.symmetric_units import Images
 from palpate.surrogates import Baseline, Continuation, LearntEnergy, Solves
 
@@ -65,23 +64,9 @@ class EnergyHistory:
     __repr__ = __str__
 
 
+@takes(EnergyOptions)
 def learn_energy(
-    solves: Solves,
-    baseline: Baseline,
-    *,
-    choose: bool = True,
-    units_max: int = 160,
-    networks: int = 12,
-    target: float = 1e-3,
-    effort: float = 1.0,
-    seconds: float | None = None,
-    workers: int | None = None,
-    deepest: float | None = None,
-    form: str = "auto",
-    radial: RadialFunction | Literal["auto"] = "auto",
-    ridge: float | None = None,
-    tolerance: float = TOLERANCE,
-    seed: int = 0,
+    solves: Solves, baseline: Baseline, *, options: EnergyOptions
 ) -> tuple[LearntEnergy, EnergyHistory]:
     """Learn the energy of a body from solves.
 
@@ -91,35 +76,6 @@ def learn_energy(
         Inputs, energies, forces and stiffnesses, and the body's symmetry.
     baseline : Baseline
         What of the energy is known beforehand.
-    choose : bool
-        Whether to choose among the baseline's `candidates`, such as contact laws; False takes it as it is.
-    units_max : int
-        Most units of one network; images count.
-    networks : int
-        How many at most make one energy, as their mean, and no more than 320 units do; one answers faster, several
-        miss less.
-    target : float
-        Leave-one-solve-out error at which no more units are added.
-    effort : float
-        Multiplies the counts of candidates and iterations of the search; 0.1 gives a quick look.
-    seconds : float, optional
-        Limit on time; by default none. A limit that ends the search early makes the result depend on the machine.
-    workers : int, optional
-        Processes that search at a time; one for each core by default, at most eight. The result is the same with any
-        number.
-    deepest : float, optional
-        Depth (m) that the solves were to reach, or that they did reach where they came less far than nine tenths of
-        it: beyond it nothing counts as trained, whatever the ranges say. By default they alone decide.
-    form : str
-        Form of a unit (see `palpate.rbf.unit_forms`), or "auto" to try several.
-    radial : {"gaussian", "inverse-multiquadric", "matern-5/2", "auto"}
-        Radial function of the units, or "auto" to try several.
-    ridge : float, optional
-        Penalty on the network's squared weights, by the noise of the solves; by default the baseline's.
-    tolerance : float
-        Relative gain per step of the refinement below which it ends; smaller for solves that bear no noise.
-    seed : int
-        Decides the starts, and with them the result.
 
     Returns
     -------
@@ -133,32 +89,16 @@ def learn_energy(
     UsageError
         If solves, symmetry or options do not fit.
     """
-    budget = Budget.of(effort, seconds)
-    if not (units_max >= 0 and networks >= 1):
-        raise UsageError(
-            f"units_max={units_max} and networks={networks} allow no learning.", fix="Give positive numbers."
-        )
-    if radial != "auto" and radial not in get_args(RadialFunction):
-        raise UsageError(f"There is no radial function {radial!r}.", fix=f"Choose from {RADIAL_FUNCTIONS}.")
+    budget = Budget.of(options.effort, options.seconds)
     samples, images = EnergySamples.of(solves, baseline), images_of(solves, baseline)
 
-    problem_of = partial(_problem, samples, images, ridge, tolerance)
+    problem_of = partial(_problem, samples, images, options)
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
         trials: tuple[Trial, ...] = ()
-        if choose and len(baseline.candidates()) > 1:
+        if options.choose and len(baseline.candidates()) > 1:
             part = budget.part(_CHOICE_SHARE)
-            baseline, trials = _choose_baseline(baseline.candidates(), problem_of, part, seed)
-        ensemble, further = search_energy(
-            problem_of(baseline),
-            form=form,
-            radial=radial,
-            units_max=units_max,
-            networks=networks,
-            target=target,
-            budget=budget,
-            workers=workers,
-            seed=seed,
-        )
+            baseline, trials = _choose_baseline(baseline.candidates(), problem_of, part, options.seed)
+        ensemble, further = search_energy(problem_of(baseline), options=options, budget=budget)
         trust = trust_of(ensemble, samples)
     meta = training_meta(samples, ensemble, trust.errors)
     network, root = export_network(ensemble, trust.root, samples, meta)
@@ -168,7 +108,7 @@ def learn_energy(
         region=trained_region(samples, images),
         continuation=Continuation.of(
             solves.inputs,
-            deepest=_reached(samples.depth, deepest),
+            deepest=_reached(samples.depth, options.deepest),
             share=baseline.share,
             felt=len(baseline.directions),
         ),
@@ -178,16 +118,16 @@ def learn_energy(
 
 
 def _problem(
-    samples: EnergySamples, images: Images | None, ridge: float | None, tolerance: float, baseline: Baseline
+    samples: EnergySamples, images: Images | None, options: EnergyOptions, baseline: Baseline
 ) -> EnergyProblem:
     finest = baseline.finest(samples.inputs)
     return EnergyProblem(
         samples.scaled,
         samples.rows(baseline),
         images,
-        ridge=baseline.ridge if ridge is None else ridge,
+        ridge=baseline.ridge if options.ridge is None else options.ridge,
         finest=None if finest is None else finest / samples.half,
-        tolerance=tolerance,
+        tolerance=options.tolerance,
     )
 
 

@@ -21,7 +21,7 @@ from palpate.rbf.refinement.rows import Rows
 __all__ = ["Trust", "trust_of"]
 
 _NINE_TENTHS = 1.645  # standard deviations that hold 90 % of a Gaussian's errors
-_MOST = 0.98
+_LARGEST_LEVERAGE = 0.98  # of a direction of a fold's rows: beyond it nothing is left to judge by
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ def trust_of(ensemble: EnergyEnsemble, samples: EnergySamples) -> Trust:
     for left in np.unique(fold[[i for i, _ in solves]]):
         members = np.flatnonzero(fold_of_row == left)
         values, V = np.linalg.eigh(Q[members] @ Q[members].T)
-        values = np.clip(values, 0.0, _MOST)
+        values = np.clip(values, 0.0, _LARGEST_LEVERAGE)
         spread = V * np.sqrt(values / (1.0 - values))
         for row, (i, first) in enumerate(solves):
             if fold[i] == left:

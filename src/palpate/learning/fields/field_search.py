@@ -24,6 +24,7 @@ from palpate.learning.search import Budget, Candidate, Search, Trial, sizes
 from palpate.learning.starts import random_units
 from palpate.network import Network, Scaling
 from palpate.network.radial import RadialFunction
+from palpate.options import FieldOptions
 from palpate.rbf.forms import unit_form
 from palpate.rbf.refinement.refine import Refined, refine
 from palpate.rbf.regressors import Regressors
@@ -167,19 +168,13 @@ def layer_at_solves(
 
 
 def search_coefficients(
-    problem: Coefficients,
-    *,
-    units_max: int,
-    budget: Budget,
-    target: float,
-    seed: int,
-    workers: int | None = None,
+    problem: Coefficients, *, budget: Budget, target: float, options: FieldOptions
 ) -> tuple[Refined, float, tuple[Trial, ...]]:
     """Return the best small network, its left-out error in the field's unit, and the records of all sizes.
 
     Of each size the closed form picks the start, and sizes are compared by what is missed of solves left out.
     """
-    search = Search(problem, budget, Pool(workers))
+    search = Search(problem, budget, Pool(options.workers))
     iterations = budget.count(_ITERATIONS, 10)
 
     def judge(winner: Candidate) -> Candidate:
@@ -187,8 +182,8 @@ def search_coefficients(
         return problem.cross_validate(winner, iterations, Budget() if first else budget)
 
     best = search.grow(
-        lambda units, last: _starts(problem.X, units, last, seed),
-        [0, *sizes(1, units_max)],
+        lambda units, last: _starts(problem.X, units, last, options.seed),
+        [0, *sizes(1, options.units_max)],
         iterations,
         target=target,
         patience=_PATIENCE,

@@ -134,9 +134,8 @@ def _regressors(
 
 
 _IN_DEPTH = 4  # one cubic
-_MOST = 84  # polynomials
-_DEGREE = 10
-_BASES = (4.0, 8.0)
+_MOST_POLYNOMIALS, _HIGHEST_DEGREE = 84, 10  # of the place
+_BASES = (4.0, 8.0)  # b, that are compared
 _RIDGE = 1e-4  # of the mean diagonal
 _ROUGH, _LEAST_OF_PRIOR = 0.1, 0.01  # of second differences in ρ, of the coefficients themselves
 _UPRIGHT = 0.2  # cosine: a surface whose normals stay this near to their mean is a graph over a plane
@@ -199,8 +198,8 @@ def directions(normals: np.ndarray) -> np.ndarray:
 
 
 def degrees(v: int) -> np.ndarray:
-    """Degrees (m, v) up to the largest total degree, ten at most, that has no more than `_MOST` of them."""
-    degree = max(d for d in range(_DEGREE + 1) if d == 0 or math.comb(d + v, v) <= _MOST)
+    """Degrees (m, v) up to the largest total degree, ten at most, that has no more than `_MOST_POLYNOMIALS` of them."""
+    degree = max(d for d in range(_HIGHEST_DEGREE + 1) if d == 0 or math.comb(d + v, v) <= _MOST_POLYNOMIALS)
     every = [p for p in itertools.product(range(degree + 1), repeat=v) if sum(p) <= degree]
     return np.array(sorted(every, key=lambda p: (sum(p), p)))
 

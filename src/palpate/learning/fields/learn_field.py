@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from palpate import checks
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.fields.decompose_field import Decomposition, best_decomposition, lumped_mass
@@ -17,6 +18,7 @@ from palpate.learning.fields.field_search import layer_at_solves, search_coeffic
 from palpate.learning.fields.snapshots import Snapshots, Solves
 from palpate.learning.search import Budget, Trial
 from palpate.network import Network, Scaling
+from palpate.options import FieldOptions, takes
 from palpate.rbf.freezing import freeze_refined, training_record
 from palpate.rbf.sample_checks import numbers
 from palpate.surrogates import FieldSurrogate, TouchedSurface
@@ -58,6 +60,7 @@ class LearntField:
     learning_left_out: float
 
 
+@takes(FieldOptions)
 def learn_snapshots(
     snapshots: Sequence[Snapshots],
     *,
@@ -69,25 +72,9 @@ def learn_snapshots(
     radius: float,
     radius_input: int | None = None,
     rest: np.ndarray | None = None,
-    name: str = "displacement",
-    unit: str = "m",
-    tolerance: float | None = None,
-    modes_max: int = 60,
-    moving: bool = True,
-    amplitude: str = "auto",
-    length: float | None = None,
-    units_max: int = 36,
-    effort: float = 1.0,
-    seconds: float | None = None,
-    workers: int | None = None,
-    seed: int = 0,
+    options: FieldOptions,
 ) -> LearntField:
-    """Learn a field on a mesh from snapshots on the meshes that they were solved on.
-
-    Parameters
-    ----------
-    snapshots : sequence of Snapshots
-        Solves, each on a mesh of its own.
+    """Learn a field on a mesh from snapshots on the meshes that they were solved on; the context is `learn_field`'s.
 
     Raises
     ------
@@ -96,25 +83,16 @@ def learn_snapshots(
 
     Notes ----- The other parameters are those of `learn_field`.
     """
-    if amplitude != "auto" and amplitude not in AMPLITUDES:
-        raise UsageError(
-            f"A field does not grow by {amplitude!r}.",
-            fix=f"Choose 'auto' or one of {', '.join(AMPLITUDES)}.",
-        )
-    budget = Budget.of(effort, seconds)
-    if not (modes_max > 0 and units_max >= 0 and radius > 0):
-        raise UsageError(
-            f"modes_max={modes_max}, units_max={units_max}, radius={radius} allow no learning.",
-            fix="Give positive numbers.",
-        )
+    checks.positive("The radius of the probe", radius, "m")
+    budget = Budget.of(options.effort, options.seconds)
     context = (inputs, surface, radius, points, triangles, mass, radius_input)
     solves = Solves.of(snapshots, *context).touching
-    tolerance = _TOLERANCE * solves.size if tolerance is None else tolerance
-    length = radius / 10.0 if length is None else length
+    tolerance = _TOLERANCE * solves.size if options.tolerance is None else options.tolerance
+    length = radius / 10.0 if options.length is None else options.length
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
-        names = AMPLITUDES if amplitude == "auto" else (amplitude,)
-        best = best_decomposition(solves, names, length, tolerance, modes_max, moving)
-        network, error, trials = _learnt(best, solves.inputs, units_max, budget, seed, workers)
+        names = AMPLITUDES if options.amplitude == "auto" else (options.amplitude,)
+        best = best_decomposition(solves, names, length, tolerance, options.modes_max, options.moving)
+        network, error, trials = _learnt(best, solves.inputs, budget, options)
     fields = np.concatenate([values.ravel() for values in solves.values])
     meta = {
         **training_record(solves.X, fields, solves.inputs),
@@ -127,7 +105,7 @@ def learn_snapshots(
         "learning_left_out": _real(error),
     }
     field = FieldSurrogate(
-        *(name, unit, network, best.modes.modes),
+        *(options.name, options.unit, network, best.modes.modes),
         *(np.zeros((len(points), solves.components)) if rest is None else rest, points, triangles, mass),
         amplitude=best.amplitude,
         surface=surface,
@@ -140,18 +118,13 @@ def learn_snapshots(
 
 
 def _learnt(
-    best: Decomposition,
-    inputs: tuple[Range, ...],
-    units_max: int,
-    budget: Budget,
-    seed: int,
-    workers: int | None,
+    best: Decomposition, inputs: tuple[Range, ...], budget: Budget, options: FieldOptions
 ) -> tuple[Network, float, tuple[Trial, ...]]:
     """The coefficients' network, its left-out error and what was tried: a unit at each solve, or a few that move."""
     whole = layer_at_solves(best.problem)
     target = 0.1 * best.truncation
     network_of_b, error, trials = search_coefficients(
-        best.problem, units_max=units_max, budget=budget, target=target, seed=seed, workers=workers
+        best.problem, budget=budget, target=target, options=options
     )
     names, scaling = _outputs(best, inputs)
     if whole.error < error:
@@ -189,6 +162,7 @@ def learn_displacement(data: Dataset, **options: Any) -> LearntField:
     return learn_field(data.X, data.displacement[:, nodes], **(context | options))
 
 
+@takes(FieldOptions)
 def learn_field(
     X: np.ndarray,
     values: np.ndarray,
@@ -199,21 +173,10 @@ def learn_field(
     surface: TouchedSurface,
     radius: float,
     radius_input: int | None = None,
-    name: str = "displacement",
-    unit: str = "m",
     rest: np.ndarray | None = None,
     mass: np.ndarray | None = None,
-    tolerance: float | None = None,
-    modes_max: int = 60,
-    moving: bool = True,
-    amplitude: str = "auto",
-    length: float | None = None,
     groups: np.ndarray | None = None,
-    units_max: int = 36,
-    effort: float = 1.0,
-    seconds: float | None = None,
-    workers: int | None = None,
-    seed: int = 0,
+    options: FieldOptions,
 ) -> LearntField:
     """Learn a field on a body's surface from solves.
 
@@ -235,38 +198,12 @@ def learn_field(
         Of the probe, m; where it is an input, a usual one, by which the moving part is as wide.
     radius_input : int, optional
         The input, 3 or later, that is the probe's radius.
-    name, unit : str
-        Name and SI unit of the field, such as "displacement" and "m".
     rest : (nodes, components), optional
         The field without contact; zero by default. A largest stretch rests at one.
     mass : (nodes,), optional
         What a node's error counts; its share of the area by default.
-    tolerance : float, optional
-        Of the modes: root mean square over surface and solves that they may miss, in the field's unit; half a
-        percent of the field's own by default.
-    modes_max : int
-        Most modes, however much they miss.
-    moving : bool
-        Whether a part that travels with the probe is taken out first.
-    amplitude : {"auto", "linear", "hertz", "square", "series"}
-        How the field begins with depth; "auto" compares all by what is missed of solves left out.
-    length : float, optional
-        Crossing length a of "series", m; a tenth of the radius by default.
     groups : (N,) int, optional
         Solves of one group, such as a column, are left out together.
-    units_max : int
-        Most units of the small network.
-    effort : float
-        Multiplies the iterations of the search of a small network, which is taken where it misses less than a unit at
-        every solve; 0.1 gives a quick look.
-    seconds : float, optional
-        Limit on that search's time; by default none. A limit that ends the search early makes the result depend on
-        the machine.
-    workers : int, optional
-        Processes that search at a time; one for each core by default, at most eight. The result is the same with any
-        number.
-    seed : int
-        Decides the starts of the search.
 
     Returns
     -------
@@ -287,18 +224,7 @@ def learn_field(
         radius=radius,
         radius_input=radius_input,
         rest=rest,
-        name=name,
-        unit=unit,
-        tolerance=tolerance,
-        modes_max=modes_max,
-        moving=moving,
-        amplitude=amplitude,
-        length=length,
-        units_max=units_max,
-        effort=effort,
-        seconds=seconds,
-        workers=workers,
-        seed=seed,
+        options=options,
     )
 
 

@@ -96,7 +96,8 @@ def _iterate(
     z, last = model.relax(start, load), math.inf
     for iteration in range(limit):
         step, decrement, stable = _direction(model, load, z)
-        error = math.sqrt(decrement / _scale(model, load, z)) if decrement >= 0 else math.nan
+        scale = max(model.energy(z), abs(float(load @ z)), model.energy_floor)
+        error = math.sqrt(decrement / scale) if decrement >= 0 else math.nan
         if not math.isfinite(error):
             return Equilibrium(z, Stop.NOT_FINITE, iteration, math.inf)
         stagnant = error < ROUND_OFF and error > 0.25 * last
@@ -107,10 +108,6 @@ def _iterate(
             return Equilibrium(z, Stop.STEP_TOO_SMALL, iteration + 1, error)
         z, last = better, error
     return Equilibrium(z, Stop.ITERATION_LIMIT, limit, last)
-
-
-def _scale(model: EnergyModel, load: np.ndarray, z: np.ndarray) -> float:
-    return max(model.energy(z), abs(float(load @ z)), model.energy_floor)
 
 
 def _direction(model: EnergyModel, load: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, float, bool]:

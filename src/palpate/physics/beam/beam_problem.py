@@ -103,7 +103,7 @@ class BeamProblem:
             # an elastic beam has no use for them, and is described as ever
             del body["fibres"], body["tolerance"]
         else:
-            body["material"] = self.body.material.describe()  # type: ignore[attr-defined]
+            body["material"] = self.body.material.describe()
         # what a viewer needs to draw the body, whatever its section is called
         body["half_height"] = self.body.section.half_height
         return {"body": body, "loads": [_description(load) for load in self.loads]}

@@ -134,7 +134,9 @@ class Cantilever:
         # positions closer than a billionth of the length are one
         fixed = np.unique(np.round(places / self.length, 9)) * self.length
         pieces = [
-            np.linspace(left, right, self._cuts(right - left), endpoint=False)
+            np.linspace(
+                left, right, max(1, round(self.elements * (right - left) / self.length)), endpoint=False
+            )
             for left, right in itertools.pairwise(fixed)
         ]
         return np.concatenate([*pieces, fixed[-1:]])
@@ -154,9 +156,6 @@ class Cantilever:
             _check(material.prony.equilibrium > 1e-9, "Prony series", material.prony, _FLOWS)
             _check(getattr(material, "part", "all") == "all", "material", material, _WHOLE)
         _check(1e-9 <= self.step_tolerance <= 0.1, "tolerance", self.tolerance, "between 1e-9 and 0.1")
-
-    def _cuts(self, span: float) -> int:
-        return max(1, round(self.elements * span / self.length))
 
 
 def _check_section(section: object) -> None:

@@ -62,7 +62,9 @@ class HistorySolver:
             reached = self._next(moment, float(time), row)
             if isinstance(reached, Failure):
                 later = self._beam.failure(reached.stop, 0, "an earlier load of the history failed")
-                return [*solutions, self._failure(reached), *[later] * (len(sizes) - len(solutions) - 1)]
+                detail = self._steps.detail(reached)
+                failed = self._beam.failure(reached.stop, reached.iterations, detail)
+                return [*solutions, failed, *[later] * (len(sizes) - len(solutions) - 1)]
             solutions.append(self._answer(reached))
             moment = reached
         return solutions
@@ -143,9 +145,6 @@ class HistorySolver:
             dissipated=moment.dissipated,
             history=moment,
         )
-
-    def _failure(self, failure: Failure) -> Solution:
-        return self._beam.failure(failure.stop, failure.iterations, self._steps.detail(failure))
 
 
 class _BeamSteps:

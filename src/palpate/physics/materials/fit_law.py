@@ -36,12 +36,12 @@ __all__ = ["fit", "ranges_of_strain"]
 
 Weight = Literal["peak", "stress", "relative"]
 _WEIGHTS = ("peak", "stress", "relative")
-_SMALL = 0.02  # of a test's largest stress: below it a relative error no longer counts
-_DIFFERENCE = 1e-5  # of a coordinate, for the Jacobian
-_REFUSED = 1e6  # residual of constants that no material has
-_STEPS = 60  # of the last search of a compressible law, which begins near its end
-_VOLUME = (-0.02, 0.02)  # J − 1 over which a nearly incompressible law is asked
-_MODES = ("uniaxial", "equibiaxial", "planar", "simple shear")
+LEAST_STRESS = 0.02  # share of a test's largest stress below which a relative error no longer counts
+DIFFERENCE = 1e-5  # share of a coordinate by which the Jacobian moves it
+REFUSED = 1e6  # residual of constants that no material has
+LAST_EVALUATIONS = 60  # of the last search of a compressible law, which begins near its end
+NEAR_VOLUME = (-0.02, 0.02)  # range of J − 1 over which a nearly incompressible law must be stable
+MODES = ("uniaxial", "equibiaxial", "planar", "simple shear")
 
 
 def fit(
@@ -111,17 +111,17 @@ def fit(
         )
     names = CANDIDATES if law is None else law if isinstance(law, list | tuple) else (law,)
     problem = _Problem(tuple(records), poisson, weight, margin)
-    found, failures = [], []
+    solutions, failures = [], []
     for name in names:
         try:
-            found.append(problem.best(form_of(name), stable=stable))
+            solutions.append(problem.best(form_of(name), stable=stable))
         except UsageError as error:
             failures.append(error)
-    if not found:
+    if not solutions:
         raise failures[0]
-    steady = [solved for solved in found if solved.verdict]
-    chosen = min(steady or found, key=lambda solved: solved.score)
-    return problem.result(chosen, found, confidence, asked=len(names) == 1)
+    steady = [solved for solved in solutions if solved.verdict]
+    chosen = min(steady or solutions, key=lambda solved: solved.score)
+    return problem.result(chosen, solutions, confidence, asked=len(names) == 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,9 @@ class _Problem:
             return [max(peaks)] * len(peaks)
         if self.weight == "peak":
             return list(peaks)
-        return [np.maximum(np.abs(t.stress), _SMALL * p) for t, p in zip(self.tests, peaks, strict=True)]
+        return [
+            np.maximum(np.abs(t.stress), LEAST_STRESS * p) for t, p in zip(self.tests, peaks, strict=True)
+        ]
 
     def model(self, form: LawForm, x: np.ndarray) -> np.ndarray:
         """Return the scaled stresses (N,) of all tests."""
@@ -193,13 +195,13 @@ class _Problem:
             return held
         shares = [f"{100 * math.sqrt(s.rss / self.rows):.2g} %" for s in (free, held)]
         note = f"Free constants of {form.name} err by {shares[0]} instead of {shares[1]} and are unstable: "
-        return _with(held, note=note + f"{free.verdict}")
+        return replace(held, note=note + f"{free.verdict}")
 
     def _solve(self, form: LawForm, *, stable: bool) -> _Solved | None:
         measured = np.concatenate([t.stress / s for t, s in zip(self.tests, self.scales(), strict=True)])
         if form.origin is not None:
-            found = self._search(form, form.origin, measured)
-            return None if found is None else self._solved(form, found, measured)
+            end = self._search(form, form.origin, measured)
+            return None if end is None else self._solved(form, end, measured)
         # stresses of a compressible law are not linear in the moduli: the incompressible one is a first guess
         is_compressible = self.poisson < 0.5
         first = replace(self, poisson=0.5)
@@ -211,7 +213,7 @@ class _Problem:
                 continue
             residual = self._residuals(form, x, measured) if is_compressible else residual
             cost = float(residual @ residual)
-            if np.abs(residual).max() < _REFUSED and (best is None or cost < best[0]):
+            if np.abs(residual).max() < REFUSED and (best is None or cost < best[0]):
                 best = cost, x, start
         if best is None:
             return None
@@ -227,16 +229,16 @@ class _Problem:
             return self._residuals(form, x, measured)
 
         scale = np.where(origin == 0, 1.0, np.abs(origin))
-        found = least_squares(residuals, origin, jac="3-point", x_scale=scale, xtol=1e-10, ftol=1e-12)
-        return None if np.abs(found.fun).max() >= _REFUSED else np.asarray(found.x)
+        end = least_squares(residuals, origin, jac="3-point", x_scale=scale, xtol=1e-10, ftol=1e-12)
+        return None if np.abs(end.fun).max() >= REFUSED else np.asarray(end.x)
 
     def _residuals(self, form: LawForm, x: np.ndarray, measured: np.ndarray) -> np.ndarray:
         """Return model − measured (N,), which is large of constants that no material has."""
         try:
             values = self.model(form, x) - measured
         except PalpateError:
-            return np.full(len(measured), _REFUSED)
-        return np.where(np.isfinite(values), values, _REFUSED)
+            return np.full(len(measured), REFUSED)
+        return np.where(np.isfinite(values), values, REFUSED)
 
     def _refine(
         self, form: LawForm, x: np.ndarray, start: tuple[float, ...], measured: np.ndarray, *, stable: bool
@@ -250,7 +252,7 @@ class _Problem:
         def residuals(z: np.ndarray) -> np.ndarray:
             return self._residuals(form, z * size, measured)
 
-        found = least_squares(
+        end = least_squares(
             residuals,
             x / size,
             jac="3-point",
@@ -262,9 +264,9 @@ class _Problem:
             xtol=1e-10,
             ftol=1e-12,
             gtol=1e-12,
-            max_nfev=_STEPS,
+            max_nfev=LAST_EVALUATIONS,
         )
-        return np.asarray(found.x * size)
+        return np.asarray(end.x * size)
 
     def _exponents(
         self, form: LawForm, start: tuple[float, ...], measured: np.ndarray, *, stable: bool
@@ -278,7 +280,7 @@ class _Problem:
         def residuals(exponents: np.ndarray) -> np.ndarray:
             return self._moduli(form, exponents, measured, stable=stable)[1]
 
-        found = least_squares(
+        end = least_squares(
             residuals,
             start,
             bounds=form.exponent_bounds(start),
@@ -286,7 +288,7 @@ class _Problem:
             xtol=1e-9,
             ftol=1e-12,
         )
-        return np.asarray(found.x)
+        return np.asarray(end.x)
 
     def _moduli(
         self, form: LawForm, exponents: np.ndarray | tuple[()], measured: np.ndarray, *, stable: bool
@@ -307,13 +309,13 @@ class _Problem:
             columns.append(self.model(form, moved) - first)
         A = np.stack(columns, axis=1)
         if not np.isfinite(A).all():  # no sides' stretch was found at these exponents
-            return origin, np.full(len(measured), _REFUSED)
-        found = nnls(A, measured)[0] if stable else np.linalg.lstsq(A, measured, rcond=None)[0]
-        return np.append(found * unit, exponents), A @ found - measured
+            return origin, np.full(len(measured), REFUSED)
+        moduli = nnls(A, measured)[0] if stable else np.linalg.lstsq(A, measured, rcond=None)[0]
+        return np.append(moduli * unit, exponents), A @ moduli - measured
 
     def _solved(self, form: LawForm, x: np.ndarray, measured: np.ndarray) -> _Solved:
         material = form.build(x, self.poisson)
-        verdict = stability(material, ranges_of_strain(self.tests, self.margin), _VOLUME)
+        verdict = stability(material, ranges_of_strain(self.tests, self.margin), NEAR_VOLUME)
         residual = self.model(form, x) - measured
         size = np.append(np.full(form.moduli, np.abs(x[: form.moduli]).max()), np.abs(x[form.moduli :]))
         ended = np.zeros(len(x), dtype=bool)
@@ -321,7 +323,7 @@ class _Problem:
             ended[: form.moduli] = x[: form.moduli] == 0  # where the non-negative squares leave it
         jacobian = np.zeros((self.rows, len(x)))
         for i in np.flatnonzero(~ended):
-            step = _DIFFERENCE * (abs(x[i]) or size[i] or 1.0) * np.eye(len(x))[i]
+            step = DIFFERENCE * (abs(x[i]) or size[i] or 1.0) * np.eye(len(x))[i]
             jacobian[:, i] = (self.model(form, x + step) - self.model(form, x - step)) / (2 * step[i])
         n, k = self.rows, len(x) + 1
         rss = float(residual @ residual)
@@ -330,7 +332,7 @@ class _Problem:
         return _Solved(form, x, jacobian, ended, rss, material, verdict, score)
 
     def result(
-        self, chosen: _Solved, found: Sequence[_Solved], confidence: float, *, asked: bool
+        self, chosen: _Solved, solutions: Sequence[_Solved], confidence: float, *, asked: bool
     ) -> MaterialFit:
         """Return the fit with everything that is said of it."""
         values = chosen.form.values(chosen.x)
@@ -343,7 +345,7 @@ class _Problem:
         }
         rivals = tuple(
             Rival(s.form.name, math.sqrt(s.rss / self.rows), s.score, str(s.verdict), bool(s.verdict))
-            for s in sorted(found, key=lambda s: s.score)
+            for s in sorted(solutions, key=lambda s: s.score)
         )
         return MaterialFit(
             chosen.material,
@@ -357,12 +359,8 @@ class _Problem:
             confidence,
             self.weight,
             math.sqrt(chosen.rss / self.rows),
-            None if chosen.form.name not in CANDIDATES else _keys(chosen, values),
+            _keys(chosen, values) if chosen.form.name in CANDIDATES else None,
         )
-
-
-def _with(solved: _Solved, **changes: Any) -> _Solved:
-    return _Solved(**{**vars(solved), **changes})
 
 
 def _is_material(form: LawForm, x: np.ndarray, poisson: float) -> bool:
@@ -449,7 +447,7 @@ def ranges_of_strain(tests: Sequence[StretchTest], margin: float) -> dict[str, t
 
     limit = 3 + (1 + margin) * max(max(t.largest_invariant for t in tests) - 3, 1e-6)
     ranges = {}
-    for mode in _MODES:
+    for mode in MODES:
         invariant = first_invariant(mode)
         rest = 0.0 if mode == "simple shear" else 1.0
 

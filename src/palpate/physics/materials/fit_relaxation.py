@@ -207,9 +207,9 @@ def fit_relaxation(
             f"The record has too few rows: {len(t)}.", why="One term needs four.", fix="Give a longer record."
         )
     least = min(score for score, _, _ in tried)
-    _, kept, rest = next(entry for entry in reversed(tried) if entry[0] <= least + STRONG)
-    found = _result(t, y, scale, ramp, kept, rest, confidence)
-    return replace(found, notes=(*record.notes, *found.notes))
+    _, branches, rest = next(entry for entry in reversed(tried) if entry[0] <= least + STRONG)
+    result = _result(t, y, scale, ramp, branches, rest, confidence)
+    return replace(result, notes=(*record.notes, *result.notes))
 
 
 def _left_of_ramp(ramp: float, tau: Any) -> Any:
@@ -230,11 +230,11 @@ def _from_grid(t: np.ndarray, y: np.ndarray, ramp: float) -> np.ndarray:
 
     low, high = t[t > 0].min() / BEYOND, t[-1] * BEYOND
     times = np.geomspace(low, high, max(2, round(PER_DECADE * math.log10(high / low))))
-    found = nnls(_columns(t, ramp, times), y, maxiter=50 * len(times))[0][1:]
+    amplitudes = nnls(_columns(t, ramp, times), y, maxiter=50 * len(times))[0][1:]
     branches: list[tuple[float, float]] = []
     last = -2
-    for i in np.flatnonzero(found > LEAST).tolist():
-        amplitude, time = float(found[i]), float(times[i])
+    for i in np.flatnonzero(amplitudes > LEAST).tolist():
+        amplitude, time = float(amplitudes[i]), float(times[i])
         if i == last + 1:  # neighbours stand for one time between them
             before, then = branches.pop()
             share = amplitude / (amplitude + before)
@@ -255,8 +255,8 @@ def _refine(
 
     def solve(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         A = _columns(t, ramp, np.exp(logs))
-        found = nnls(A, y)[0]
-        return found, A @ found - y
+        amplitudes = nnls(A, y)[0]
+        return amplitudes, A @ amplitudes - y
 
     ends = math.log(t[t > 0].min() / BEYOND), math.log(100 * t[-1])
     start = np.clip(np.log(branches[:, 1]), ends[0] + 1e-6, ends[1] - 1e-6)

@@ -27,7 +27,8 @@ from palpate.physics.materials.yeoh import Yeoh
 
 __all__ = ["CANDIDATES", "FORMS", "LawForm", "form_of", "stress_in_test"]
 
-_STEP = 1e-40  # of the complex step
+_STEP = 1e-40  # of the complex step: its square vanishes beside 1 in double precision
+# magnitudes of exponents between which a search stays
 _LEAST_EXPONENT, _LARGEST_EXPONENT = 0.05, 40.0
 
 

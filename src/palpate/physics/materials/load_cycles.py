@@ -18,9 +18,9 @@ from palpate.format import count
 
 __all__ = ["Run", "load_runs", "rows_of_cycle", "turning_points"]
 
-_TURN = 0.05  # of the range of the deformation
-_FEWEST = 4  # rows of a run, with its ends
-_CHOICE = re.compile(r"(?P<which>first|last|\d+)(?:\s+(?P<kind>loading|unloading))?|(?P<all>all)")
+TURN = 0.05  # share of the deformation's range by which a run turns back: noise is less
+LEAST_ROWS = 4  # rows of a run, with its ends
+CHOICE = re.compile(r"(?P<which>first|last|\d+)(?:\s+(?P<kind>loading|unloading))?|(?P<all>all)")
 
 
 class Run(NamedTuple):
@@ -37,11 +37,11 @@ def load_runs(deformation: np.ndarray) -> list[Run]:
 
     A record that never turns has none, nor have rows in no order of loading.
     """
-    turns = turning_points(deformation, _TURN * float(np.ptp(deformation)))
-    if len(turns) < 3 or len(deformation) < _FEWEST * (len(turns) - 1):
+    turns = turning_points(deformation, TURN * float(np.ptp(deformation)))
+    if len(turns) < 3 or len(deformation) < LEAST_ROWS * (len(turns) - 1):
         return []
     runs = []
-    small = _TURN * np.ptp(deformation)
+    small = TURN * np.ptp(deformation)
     for a, b in itertools.pairwise(turns):
         ends = [a, b]
         if min(abs(deformation[a]), abs(deformation[b])) > small and deformation[a] * deformation[b] < 0:
@@ -49,7 +49,7 @@ def load_runs(deformation: np.ndarray) -> list[Run]:
         for i, j in itertools.pairwise(ends):
             while i < j and deformation[i + 1] == deformation[i]:  # a hold belongs to neither side
                 i += 1
-            if j - i + 1 >= _FEWEST:
+            if j - i + 1 >= LEAST_ROWS:
                 loads = bool(abs(deformation[j]) > abs(deformation[i]))
                 runs.append(Run(i, j, loads, 1 if deformation[j if loads else i] > 0 else -1))
     return runs
@@ -61,7 +61,7 @@ def rows_of_cycle(deformation: np.ndarray, choice: str | None) -> tuple[np.ndarr
     `deformation` (N,) is a strain, λ − 1, or a depth; 0 at rest. `choice` is "first", "last", a number or "all", "2
     unloading" for the way back; by default the first loading.
     """
-    match = _CHOICE.fullmatch((choice or "first").strip().lower())
+    match = CHOICE.fullmatch((choice or "first").strip().lower())
     if match is None:
         raise UsageError(
             f"{choice!r} is no cycle of a test.",
@@ -90,7 +90,7 @@ def rows_of_cycle(deformation: np.ndarray, choice: str | None) -> tuple[np.ndarr
     if not chosen:
         raise UsageError(
             f"The record has no cycle {choice!r}.",
-            why=f"It has {what}, counted by turns of more than {_TURN:.0%} of the range.",
+            why=f"It has {what}, counted by turns of more than {TURN:.0%} of the range.",
             fix="Choose one of these, or --cycle all.",
         )
     rows = np.unique(np.concatenate([every[r.first : r.last + 1] for r in chosen]))

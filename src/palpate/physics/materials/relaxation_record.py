@@ -18,14 +18,16 @@ from palpate.physics.materials.load_cycles import turning_points
 
 __all__ = ["HeldRecord", "held_record"]
 
-_MIDDLE = (0.3, 0.9)  # of the rise: what its curve at the end is taken from
-_BOTTOM = (0.1, 0.5)  # of the rise: what its curve at the beginning is taken from
-_FLAT = 0.05  # of the rise: below it a row lies before the rise
-_NEAR = 0.3  # of the rise's time: so far the beginning of the hold is followed
-_FEWEST = 4  # rows of a hold
-_AGAIN = 0.1  # of the range of the response: a rise that is more is one of the deformation
-_OFF = 0.05  # of the first response: a fall at once that is more is the end of the hold
-_CLOCK = 20  # samples that would fit before the first one: a record does not start so late by itself
+# shares of the rise between which its curve is taken, for the end of the rise and for its beginning
+END_SHARES, START_SHARES = (0.3, 0.9), (0.1, 0.5)
+BEFORE_RISE = 0.05  # share of the rise below which a row lies before it
+HOLD_START = 0.3  # share of the rise's time over which the hold's curve is taken at its beginning
+LEAST_ROWS = 4  # rows of a hold
+SECOND_RISE = 0.1  # share of the response's range above which a rise is one of the deformation
+RELEASE = 0.05  # share of the first response above which a fall at once ends the hold
+LATEST_START = (
+    20  # samples that would fit before the first one; a record that starts later has a clock of its own
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ def held_record(
             fix="Give the begin on the clock of the record: begin= (--begin).",
         )
     length = ramp if ramp is not None else max(start - rise[0], 0.0) if rise else 0.0
-    found = sign * rise[2] if rise and rise[2] is not None and not first else None
+    before = sign * rise[2] if rise and rise[2] is not None and not first else None
     notes = []
     if first:
         notes.append(
@@ -73,9 +75,9 @@ def held_record(
         notes.append(
             f"Found in the record: {' and '.join(words)}. begin= and ramp= (--begin, --ramp) say it otherwise."
         )
-    if preload is None and found:
+    if preload is None and before:
         notes.append(
-            f"Before the rise the response was {number(found)}, a preload: it is subtracted. preload=0 (--preload) "
+            f"Before the rise the response was {number(before)}, a preload: it is subtracted. preload=0 (--preload) "
             "keeps it."
         )
     if not rise and preload is None and begin is not None:
@@ -89,7 +91,7 @@ def held_record(
             f"At {number(time[rows[-1]])} s the response {what}: the hold ends there, and "
             f"{count(len(time) - 1 - int(rows[-1]), 'row')} after it are not fitted."
         )
-    level = preload if preload is not None else found or 0.0
+    level = preload if preload is not None else before or 0.0
     return HeldRecord(time[rows] - start, response[rows] - level, length, tuple(notes))
 
 
@@ -103,7 +105,7 @@ def _rows_of_hold(t: np.ndarray, y: np.ndarray, begin: float | None) -> tuple[in
 
     That is the first hold of the record, or the one that begins at `begin`; it ends where the response rises again.
     """
-    threshold = max(_AGAIN * float(np.ptp(y)), 8 * _noise(y))
+    threshold = max(SECOND_RISE * float(np.ptp(y)), 8 * _noise(y))
     turns = turning_points(y, threshold)
     ups = [(a, b) for a, b in itertools.pairwise(turns) if y[b] - y[a] > threshold]
     if begin is None:
@@ -123,7 +125,7 @@ def _fall(t: np.ndarray, y: np.ndarray) -> int:
 
     A relaxation only becomes slower: a fall that is several times as fast as the one before it is none.
     """
-    least = max(_OFF * float(y[0]), 8 * _noise(y))
+    least = max(RELEASE * float(y[0]), 8 * _noise(y))
     for width in (1, 4, 16):
         i = np.arange(width, len(y) - width)
         i = i[t[i] - t[0] > 0.2 * (t[-1] - t[0])]
@@ -143,7 +145,7 @@ def _check_clock(time: np.ndarray) -> None:
     count = max(1, len(steps) // 20)
     first, last = float(np.median(steps[:count])), float(np.median(steps[-count:]))
     grows = time[-1] * first / max(time[0] * last, 1e-300)  # 1 for samples even in the logarithm of the time
-    if 0 <= time[0] <= _CLOCK * first or (time[0] > 0 and 1 / 3 < grows < 3):
+    if 0 <= time[0] <= LATEST_START * first or (time[0] > 0 and 1 / 3 < grows < 3):
         return
     raise UsageError(
         f"The record begins at {time[0]:g} s, with samples {first:.2g} s apart, and has no rise: when the hold began "
@@ -159,24 +161,24 @@ def _find_ramp(t: np.ndarray, y: np.ndarray, peak: int) -> tuple[float, float, f
 
     Without a rise, or without rows of a hold after it, all is None.
     """
-    if not 1 <= peak <= len(y) - _FEWEST:
+    if not 1 <= peak <= len(y) - LEAST_ROWS:
         return None
     base = float(y[:peak].min())
     top = float(y[peak])
-    bottom = int(np.flatnonzero(y[:peak] <= base + _FLAT * (top - base))[-1])
+    bottom = int(np.flatnonzero(y[:peak] <= base + BEFORE_RISE * (top - base))[-1])
     # in a rise it would be shorter
-    flat = bottom >= 2 and t[bottom] - t[0] > 3 * _FLAT * (t[peak] - t[bottom])
+    flat = bottom >= 2 and t[bottom] - t[0] > 3 * BEFORE_RISE * (t[peak] - t[bottom])
     base = float(np.median(y[: bottom + 1])) if flat else base
     share = (y - base) / (top - base)
     span = np.arange(bottom + 1, peak)
-    low = span[(share[span] >= _BOTTOM[0]) & (share[span] <= _BOTTOM[1])]
+    low = span[(share[span] >= START_SHARES[0]) & (share[span] <= START_SHARES[1])]
     begin = float(t[bottom]) if flat else float(t[0])
     if len(low) >= 2:
         begin = _crossing(t, share, low, np.array([0.0]), (2 * t[bottom] - t[low[0]], t[low[0]]))
-    middle = span[(share[span] >= _MIDDLE[0]) & (share[span] <= _MIDDLE[1])]
+    middle = span[(share[span] >= END_SHARES[0]) & (share[span] <= END_SHARES[1])]
     end = float(t[peak])
     if len(middle) >= 2:
-        near = np.flatnonzero((t >= t[peak]) & (t <= t[peak] + _NEAR * (t[peak] - begin)))
+        near = np.flatnonzero((t >= t[peak]) & (t <= t[peak] + HOLD_START * (t[peak] - begin)))
         end = _crossing(t, share, middle, _curve(t, share, near), (t[middle[-1]], t[peak]))
     return begin, end, base if flat else None
 

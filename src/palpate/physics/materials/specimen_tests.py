@@ -28,8 +28,8 @@ __all__ = [
 
 MODES = ("uniaxial", "equibiaxial", "planar")
 MEASURES = ("nominal", "true")
-_FEWEST = 3
-_LARGEST = 20.0  # stretch of no elastomer; a strain in percent looks like one
+LEAST_ROWS = 3  # of a test: fewer tell no curve
+LARGEST_STRETCH = 20.0  # stretch of no elastomer; a strain in percent looks like one
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +66,10 @@ class StretchTest:
         checks.one_of("The mode of a test", self.mode, MODES)
         checks.one_of("The measure of stress", self.measure, MEASURES)
         stretch, stress = columns_of_numbers("stretches", self.stretch, "stresses", self.stress)
-        if stretch.min() <= 0 or stretch.max() > _LARGEST:
+        if stretch.min() <= 0 or stretch.max() > LARGEST_STRETCH:
             raise UsageError(
                 f"The stretches of the {self.mode} test run from {stretch.min():g} to {stretch.max():g}.",
-                why=f"A stretch is length over undeformed length, between 0 and {_LARGEST:g}; 1 is undeformed.",
+                why=f"A stretch is length over undeformed length, between 0 and {LARGEST_STRETCH:g}; 1 is undeformed.",
                 fix="Pass strains by StretchTest.of_strain, as numbers and not in percent.",
             )
         if np.allclose(stretch, 1):
@@ -210,10 +210,10 @@ def columns_of_numbers(
                 fix="Leave out rows with gaps.",
             )
         pair.append(column)
-    if len(pair[0]) != len(pair[1]) or len(pair[0]) < _FEWEST:
+    if len(pair[0]) != len(pair[1]) or len(pair[0]) < LEAST_ROWS:
         raise UsageError(
             f"There are {len(pair[0])} {what} and {len(pair[1])} {other}.",
-            why=f"Each row of a test has one of both, and there are at least {_FEWEST} rows.",
+            why=f"Each row of a test has one of both, and there are at least {LEAST_ROWS} rows.",
             fix="Pass two arrays of equal length.",
         )
     return pair[0], pair[1]

@@ -35,8 +35,8 @@ __all__ = ["stretch_sums"]
 
 _SMALL_DEVIATOR = 0.05**2  # J₂/m²: eleven powers leave 1e-10 of the second derivative
 _SMALL_GAP = 0.06**2  # q²/p²: six terms leave as little
-_TERMS = 11
-_PAIRS = 6
+_TERMS = 11  # highest power of the binomial series for small deviators
+_PAIRS = 6  # even powers of q/p in the series for a pair of close eigenvalues
 # cos(acos(w)/3) on 0 ≤ w ≤ 1 to 5e-6, before two Newton steps that square that error each
 _START = (0.86602985, 0.16642902, -0.04600526, 0.01764236, -0.00409941)
 

@@ -148,7 +148,8 @@ def _solids(path: str, shape: Any) -> tuple[list[Any], list[str]]:
         lone = [edge.center for edge, times in count.items() if times == 1]
         if not lone and len(list(sewn.faces)) == len(faces):
             solids = [Solid(shell) for shell in sewn.shells]
-            note = f"It holds {len(faces)} faces and no solid: they were sewn into {_count(len(solids))}."
+            sewn_into = "a solid" if len(solids) == 1 else f"{len(solids)} solids"
+            note = f"It holds {len(faces)} faces and no solid: they were sewn into {sewn_into}."
             return [solid if solid.mass > 0 else solid.Reversed() for solid in solids], [note]
     where = (
         ", ".join(f"{v * MILLIMETRE:.4g}" for v in np.mean([list(p) for p in lone], axis=0)) if lone else "?"
@@ -158,10 +159,6 @@ def _solids(path: str, shape: Any) -> tuple[list[Any], list[str]]:
         why=f"There is a hole around ({where}) m, or the faces lie further apart than {SEAMS[-1]:g} of the length.",
         fix="Close and sew the faces in the CAD program, and export a solid.",
     )
-
-
-def _count(solids: int) -> str:
-    return "a solid" if solids == 1 else f"{solids} solids"
 
 
 def _number_names(solids: list[Any]) -> list[str]:

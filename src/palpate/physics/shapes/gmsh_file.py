@@ -118,8 +118,8 @@ def _read(path: str, content: bytes) -> MeshSource:
     if old and binary == b"1":
         raise ValueError("binary files of format 4.0 are not read; save it in format 4.1")
     if binary == b"1":
-        one = form[form.index(b"\n") + 1 :][:4]
-        order = "<" if one == b"\x01\0\0\0" else ">"
+        mark = form[form.index(b"\n") + 1 :][:4]
+        order = "<" if mark == b"\x01\0\0\0" else ">"
         if size != b"8":
             raise ValueError(f"sizes of {size.decode()} bytes")
     groups: dict[tuple[int, int], list[int]] = {}
@@ -226,14 +226,12 @@ def _read_elements(
         elementary[dimension, entity].append(members)
         for group in groups.get((dimension, entity), []):
             physical[dimension, group].append(members)
-    for dimension, found, word in ((3, source.regions, "region"), (2, source.faces, "surface")):
+    for dimension, named_groups, word in ((3, source.regions, "region"), (2, source.faces, "surface")):
         mine = {key: parts for key, parts in physical.items() if key[0] == dimension}
+        given_names = names if mine else {}
         if not mine:
             mine = {key: parts for key, parts in elementary.items() if key[0] == dimension}
             mine = mine if len(mine) > 1 else {}
-            known: dict[tuple[int, int], str] = {}
-        else:
-            known = names
         for key in sorted(mine):
-            name = known.get(key, f"{word} {key[1]}")
-            found.append(Group(name, np.concatenate(mine[key]), numbered=key not in known))
+            name = given_names.get(key, f"{word} {key[1]}")
+            named_groups.append(Group(name, np.concatenate(mine[key]), numbered=key not in given_names))

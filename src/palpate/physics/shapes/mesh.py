@@ -126,8 +126,7 @@ class BodyMesh:
     @cached_property
     def parts(self) -> tuple[np.ndarray, np.ndarray]:
         """Number of the part of each tetrahedron (e,) and of each outer triangle (t,): what common faces join."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
+        from trimesh.graph import connected_component_labels
 
         count = len(self.tetrahedra)
         faces = np.sort(np.concatenate([self.tetrahedra[:, FACES].reshape(-1, 3), self.triangles]), axis=1)
@@ -139,9 +138,8 @@ class BodyMesh:
             order
         ]
         same = np.flatnonzero(key[order][1:] == key[order][:-1])
-        size = count + len(self.triangles)
-        graph = coo_array((np.ones(len(same)), (owner[same], owner[same + 1])), shape=(size, size))
-        part = connected_components(graph, directed=False)[1]
+        pairs = np.column_stack([owner[same], owner[same + 1]])
+        part = connected_component_labels(pairs, node_count=count + len(self.triangles))
         return part[:count], part[count:]
 
     def on(self, surface: str) -> np.ndarray:

@@ -27,7 +27,7 @@ from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volum
 from palpate.physics.shapes.mesh_cells import duplicate_cells, merge_nodes, shortest_edge, split_cells
 from palpate.physics.shapes.mesh_groups import Group, MeshSource
 from palpate.physics.shapes.mesh_source import read_source
-from palpate.physics.shapes.meshing import MOST_ELEMENTS, FineMesh
+from palpate.physics.shapes.meshing import MOST_ELEMENTS, FineMesh, boxes_meet
 from palpate.physics.shapes.shape import Shape, require_size
 from palpate.physics.shapes.surface_checks import touching_shells
 from palpate.physics.shapes.surface_repair import place
@@ -325,10 +325,10 @@ def _bisect(mesh: Any, refinement: FineMesh) -> None:
         marked = set()
         for face in mesh.Boundaries(name).Elements():
             corners = np.array([mesh[v].point for v in face.vertices])
-            long = (
-                np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max() > 1.5 * refinement.element
-            )
-            if long and _overlaps(corners, refinement):
+            longest = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max()
+            if longest > 1.5 * refinement.element and boxes_meet(
+                corners.min(axis=0), corners.max(axis=0), refinement
+            ):
                 marked |= {element.nr for f in face.facets for element in mesh[f].elements}
         if not marked:
             return
@@ -341,10 +341,3 @@ def _bisect(mesh: Any, refinement: FineMesh) -> None:
         for element in mesh.Elements():
             mesh.SetRefinementFlag(element, element.nr in marked)
         mesh.Refine()
-
-
-def _overlaps(corners: np.ndarray, refinement: FineMesh) -> bool:
-    if refinement.lower is None or refinement.upper is None:
-        return True
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    return bool(((low <= refinement.upper) & (high >= refinement.lower)).all())

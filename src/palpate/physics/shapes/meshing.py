@@ -25,6 +25,7 @@ __all__ = [
     "MOST_ELEMENTS",
     "THREADS",
     "FineMesh",
+    "boxes_meet",
     "mesh_solid",
     "points_on",
     "require_budget",
@@ -124,14 +125,14 @@ def points_on(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
     corners = mesh.points[mesh.triangles_of(refinement.surface)]
     small = []
     while len(corners):
-        corners = corners[_meets(corners, refinement)]
+        corners = corners[boxes_meet(corners.min(axis=1), corners.max(axis=1), refinement)]
         require_budget([], [(_areas(corners).sum(), refinement.element)])
         fits = _longest(corners)[1] <= refinement.element / 2
         small.append(corners[fits])
         corners = _halve(corners[~fits])
     triangles = np.concatenate(small) if small else np.empty((0, 3, 3))
     centres = triangles.mean(axis=1)
-    inside = _within(centres, refinement)
+    inside = boxes_meet(centres, centres, refinement)
     return centres[inside], float(_areas(triangles[inside]).sum())
 
 
@@ -152,18 +153,11 @@ def _areas(corners: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
 
-def _meets(corners: np.ndarray, refinement: FineMesh) -> np.ndarray:
-    """Mask (t,) of the triangles (t, 3, 3) whose boxes touch that of the refinement."""
+def boxes_meet(low: np.ndarray, high: np.ndarray, refinement: FineMesh) -> np.ndarray:
+    """Return a mask (...) of the boxes between corners (..., 3) in m that touch that of the refinement."""
     if refinement.lower is None or refinement.upper is None:
-        return np.ones(len(corners), dtype=bool)
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    return np.asarray(((low <= refinement.upper) & (high >= refinement.lower)).all(axis=1))
-
-
-def _within(points: np.ndarray, refinement: FineMesh) -> np.ndarray:
-    if refinement.lower is None or refinement.upper is None:
-        return np.ones(len(points), dtype=bool)
-    return np.asarray(((points >= refinement.lower) & (points <= refinement.upper)).all(axis=1))
+        return np.ones(low.shape[:-1], dtype=bool)
+    return np.asarray(((low <= refinement.upper) & (high >= refinement.lower)).all(axis=-1))
 
 
 def _longest(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

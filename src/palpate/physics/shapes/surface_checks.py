@@ -106,8 +106,8 @@ def _crossing(surface: Trimesh) -> tuple[int, int] | None:
         a, b = first[apart], second[apart]
         hit = _pierces(corners[a], corners[b]) | _pierces(corners[b], corners[a])
         if hit.any():
-            one, other = int(a[hit.argmax()]), int(b[hit.argmax()])
-            return min(one, other), max(one, other)
+            low, high = sorted((int(a[hit.argmax()]), int(b[hit.argmax()])))
+            return low, high
     return None
 
 
@@ -188,8 +188,8 @@ def closest_points(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     # trimesh compares fourth powers of lengths with fixed bounds, so that triangles of millimetres in m are nothing
     origin = triangles[:, :1]
     size = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)[:, None]
-    found = closest_point((triangles - origin) / size[:, :, None], (points - origin[:, 0]) / size)
-    return np.asarray(found * size + origin[:, 0])
+    nearest = closest_point((triangles - origin) / size[:, :, None], (points - origin[:, 0]) / size)
+    return np.asarray(nearest * size + origin[:, 0])
 
 
 def surface_gap(corners: np.ndarray, others: np.ndarray) -> tuple[float, np.ndarray]:
@@ -280,8 +280,8 @@ def touching_shells(surface: Trimesh) -> tuple[int, int, np.ndarray] | None:
         a, b = a[level], b[level]
         touching = _overlap(corners[a], corners[b], normals[a], tolerance)
         if touching.any():
-            one, other = sorted((int(shell[a[touching][0]]) + 1, int(shell[b[touching][0]]) + 1))
-            return one, other, corners[b[touching]].mean(axis=(0, 1))
+            low, high = sorted((int(shell[a[touching][0]]) + 1, int(shell[b[touching][0]]) + 1))
+            return low, high, corners[b[touching]].mean(axis=(0, 1))
     return None
 
 

@@ -63,12 +63,9 @@ def _edges(triangles: np.ndarray) -> np.ndarray:
 
 def open_edges(triangles: np.ndarray) -> np.ndarray:
     """Index into the edges (3 t) of those that belong to one triangle only."""
-    if not len(triangles):
-        return np.empty(0, dtype=np.int64)
-    _, inverse, count = np.unique(
-        np.sort(_edges(triangles), axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    return np.flatnonzero(count[inverse.ravel()] == 1)
+    from trimesh.grouping import group_rows
+
+    return np.sort(group_rows(np.sort(_edges(triangles), axis=1), require_count=1))
 
 
 def is_manifold(triangles: np.ndarray) -> bool:
@@ -84,18 +81,14 @@ def unite_points(points: np.ndarray, tolerance: float) -> np.ndarray:
     `points` are (n, 3) in m; up to `tolerance`, in m, two points are one. Returns the index (n,) of the first point
     of the chain.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
+    from trimesh.graph import connected_component_labels
 
     # equal ones first: each corner of an STL file comes about six times
     _, first, of = np.unique(points, axis=0, return_index=True, return_inverse=True)
     of = of.ravel()
     pairs = cKDTree(points[first]).query_pairs(tolerance, output_type="ndarray")
-    chain: np.ndarray = of
-    if len(pairs):
-        graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(first), len(first)))
-        chain = connected_components(graph, directed=False)[1][of]
+    chain = connected_component_labels(pairs, node_count=len(first))[of] if len(pairs) else of
     # np.unique gives the first occurrence, so that nodes keep the order of the file
     _, lead, group = np.unique(chain, return_index=True, return_inverse=True)
     return np.asarray(lead[group.ravel()], dtype=np.int64)
@@ -134,14 +127,10 @@ def _close_gaps(surface: Surface) -> Surface:
         moved = float(np.linalg.norm(surface.points - surface.points[node], axis=1).max())
         corners = int((node != np.arange(len(node))).sum())
         return closed.with_note(
-            f"{corners} corners of triangles missed their neighbours by up to {_millimetres(moved)} and were united: "
-            f"{least} edges were open."
+            f"{corners} corners of triangles missed their neighbours by up to {number(1e3 * moved, 2)} mm and were "
+            f"united: {least} edges were open."
         )
     return surface
-
-
-def _millimetres(length: float) -> str:
-    return f"{number(1e3 * length, 2)} mm"
 
 
 def _drop_flat(surface: Surface) -> Surface:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -287,17 +287,15 @@ class SolidModel:
         """Return how dear it is to go from one vector of inputs to another, on the scale of a straight approach."""
         total = 0.0
         for part, rows in zip(self.inputs.attached, self.inputs.slices, strict=True):
-            length: Callable[[Any, Any], float] = part.distance or _length
-            total += length(here[rows], there[rows]) ** 2
+            if part.distance is not None:
+                total += part.distance(here[rows], there[rows]) ** 2
+            else:
+                total += float(np.linalg.norm(there[rows] - here[rows])) ** 2
         return float(np.sqrt(total))
 
     def first_step(self) -> float:
         """Return the longest first step along a path, as a distance between inputs."""
         return min((part.first_step for part in self.inputs.attached), default=np.inf)
-
-
-def _length(here: np.ndarray, there: np.ndarray) -> float:
-    return float(np.linalg.norm(there - here))
 
 
 @dataclass(frozen=True, eq=False)

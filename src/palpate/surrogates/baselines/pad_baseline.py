@@ -203,4 +203,4 @@ def _rest(position, xi, base, small, args) -> None:  # type: ignore[no-untyped-d
 @part
 def _log(xi, g, H, scales, args) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Add the polynomial P."""
-    return stiffening_into(xi, g, H, scales, args[3], args[4], args[5])
+    return stiffening_into(xi, g, H, scales, args[3], args[4], args[5])  # type: ignore[no-any-return]

@@ -102,7 +102,7 @@ def _flat_distance_into(
         for j in range(i, 3):
             hessian[i, j] = (px * frame[4 + j] + py * frame[7 + j] + pz * frame[10 + j]) / (h * h)
             hessian[j, i] = hessian[i, j]
-    return d
+    return d  # type: ignore[no-any-return]
 
 
 @part
@@ -128,7 +128,7 @@ def distance_into(
     gradient[:] = 0.0
     hessian[:] = 0.0
     if profile.size:
-        return _flat_distance_into(c, gradient, hessian, frame, coefficients, profile)
+        return _flat_distance_into(c, gradient, hessian, frame, coefficients, profile)  # type: ignore[no-any-return]
     h = frame[3]
     u, v, w = (c[0] - frame[0]) / h, (c[1] - frame[1]) / h, (c[2] - frame[2]) / h
     if not math.isfinite(u + v + w):

@@ -128,7 +128,7 @@ def _step(t: float) -> float:
 @part
 def _bridge(r: float) -> float:
     """w, of a distance in radii."""
-    return _step((r - START) / (FINISH - START))
+    return _step((r - START) / (FINISH - START))  # type: ignore[no-any-return]
 
 
 @part
@@ -217,7 +217,7 @@ def _over(
 @part
 def _turned(d: float, r: float, behind: float, end: float) -> float:
     """Distance where the nearest point is farther away than `behind`, on the inner side."""
-    return d + (end - d) * _step((r - behind) / (end - behind))
+    return d + (end - d) * _step((r - behind) / (end - behind))  # type: ignore[no-any-return]
 
 
 @kernel(allocates=True)
@@ -279,8 +279,8 @@ def _about_border(
     if inside:
         return _within(height, square, radius) if shoulder == 0.0 else (height, PLAIN)
     if shoulder > 0.0:
-        return _rolled(height, r, shoulder, radius)
-    return _beyond(height, r, radius)
+        return _rolled(height, r, shoulder, radius)  # type: ignore[no-any-return]
+    return _beyond(height, r, radius)  # type: ignore[no-any-return]
 
 
 @kernel(allocates=True)

@@ -19,7 +19,7 @@ from palpate.surrogates import NodeField, Surrogate
 from palpate.validation.figures.displayed_shape import ShapeErrors
 from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.figures.loop_work import LoopWork, function_work
-from palpate.validation.figures.stiffness import StiffnessErrors, curve_slope
+from palpate.validation.figures.stiffness import METHOD, StiffnessErrors, curve_slope
 from palpate.validation.subject import Subject, hand_inputs
 from palpate.validation.unseen_solves import TouchFunction, TouchSolves
 from palpate.validation.worst import Worst, outer_part
@@ -162,16 +162,8 @@ def shape_by_load(subject: Subject) -> ShapeErrors | None:
     model, test = subject.loads, subject.data
     if model is None or test is None:
         return None
-    solved = test.displacement[:, :, :2]
-    error = np.linalg.norm(predicted_field(model, test.X) - solved, axis=2)
-    sample, node = (int(i) for i in np.unravel_index(np.argmax(error), error.shape))
-    place = f"the node at {test.rest[node, 0]:g} m"
-    return ShapeErrors(
-        mean=float(error.mean()),
-        max=float(error.max()),
-        largest=float(np.linalg.norm(solved, axis=2).max()),
-        worst=Worst.of(float(error.max()), test.X[sample], test.ranges, place),
-    )
+    shown, solved = predicted_field(model, test.X), test.displacement[:, :, :2]
+    return ShapeErrors.of(shown, solved, test, lambda node: f"the node at {test.rest[node, 0]:g} m")
 
 
 def stiffness_by_load(subject: Subject) -> StiffnessErrors | str | None:
@@ -241,10 +233,7 @@ def stiffness_errors(model: Surrogate, test: Dataset) -> StiffnessErrors | str:
     rows, slope = curve
     truth, D = 1.0 / slope, model.energy.baseline.directions[0]
     answer = -np.einsum("nij,i,j->n", model.energy.stiffness(X[rows]), D, D)
-    error = np.abs(answer - truth) / np.abs(truth)
-    i = int(np.argmax(error))
-    worst = Worst.of(error[i], test.X[rows[i]], test.ranges)
-    return StiffnessErrors(float(np.median(error)), float(np.quantile(error, 0.95)), worst)
+    return StiffnessErrors.of(np.abs(answer - truth) / np.abs(truth), test.X[rows], test.ranges, METHOD)
 
 
 def _line_of(model: Surrogate) -> NodeField:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,17 @@ class ShapeErrors(Figure):
         """Return the values that are compared with limits."""
         return {"displacement_mean": (self.mean, None), "displacement_max": (self.max, self.worst)}
 
+    @classmethod
+    def of(
+        cls, shown: np.ndarray, solved: np.ndarray, test: Dataset, names: Callable[[int], str]
+    ) -> ShapeErrors:
+        """Compare displacements (N, nodes, axes) that are shown and solved, in m; `names` tells a node in words."""
+        error = np.linalg.norm(shown - solved, axis=2)
+        sample, node = (int(i) for i in np.unravel_index(np.argmax(error), error.shape))
+        worst = Worst.of(float(error.max()), test.X[sample], test.ranges, names(node))
+        largest = float(np.linalg.norm(solved, axis=2).max())
+        return cls(float(error.mean()), float(error.max()), largest, worst)
+
 
 def displayed_shape(subject: Subject) -> ShapeErrors | str | None:
     """Return the errors of the displayed shape, or the reason why there are none."""
@@ -49,12 +61,8 @@ def shape_errors(field: FieldSurrogate, test: Dataset) -> ShapeErrors:
     nodes, own = np.unique(test.triangles, return_inverse=True)
     points = test.rest[nodes]
     shown = field.values_at(test.X, points, own.reshape(-1, 3))
-    error = np.linalg.norm(shown - test.displacement[:, nodes], axis=2)
-    sample, node = (int(i) for i in np.unravel_index(np.argmax(error), error.shape))
-    place = "the node at " + ", ".join(f"{1e3 * x:.3g}" for x in points[node]) + " mm"
-    return ShapeErrors(
-        float(error.mean()),
-        float(error.max()),
-        float(np.linalg.norm(test.displacement[:, nodes], axis=2).max()),
-        Worst.of(float(error.max()), test.X[sample], test.ranges, place),
-    )
+
+    def name(node: int) -> str:
+        return "the node at " + ", ".join(f"{1e3 * x:.3g}" for x in points[node]) + " mm"
+
+    return ShapeErrors.of(shown, test.displacement[:, nodes], test, name)

@@ -32,6 +32,13 @@ class StiffnessErrors(Figure):
     worst: Worst
     method: str = METHOD
 
+    @classmethod
+    def of(cls, error: np.ndarray, X: np.ndarray, ranges: Sequence[Range], method: str) -> StiffnessErrors:
+        """Return the figures of relative errors (N,) at inputs X (N, n)."""
+        i = int(np.argmax(error))
+        worst = Worst.of(error[i], X[i], ranges)
+        return cls(float(np.median(error)), float(np.quantile(error, 0.95)), worst, method)
+
     def measured(self) -> Measured:
         """Return the value that is compared with a limit."""
         return {"stiffness_p95": (self.p95, self.worst)}
@@ -49,9 +56,7 @@ def matrix_errors(
     if not rows.any():
         return "Stiffness is not judged: the solves do not know theirs."
     error = np.linalg.norm(answer[rows] - truth[rows], axis=(1, 2)) / size[rows]
-    i = int(np.argmax(error))
-    worst = Worst.of(error[i], X[rows][i], ranges)
-    return StiffnessErrors(float(np.median(error)), float(np.quantile(error, 0.95)), worst, MATRIX)
+    return StiffnessErrors.of(error, X[rows], ranges, MATRIX)
 
 
 def curve_slope(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -306,10 +306,7 @@ def _from_middle(X: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
 def aim_device(device: str, body: Touchable) -> str:
     """Return the device; a scripted stroke without a place presses where the body was trained to be pressed.
 
-    Raises
-    ------
-    UsageError
-        If there is no device of that name.
+    A name that no device has is refused.
     """
     name, _, text = device.partition(":")
     scale = body.workspace(device_traits(device).radius).scale

@@ -58,19 +58,10 @@ _SIDE, _CELL = 8, 0.01  # nodes and spacing (m) of the grid under a small body's
 class WarmUp:
     """A process beside this one that compiles the kernels of kinds of bodies; none is started where all are ready.
 
-    A context manager: the process ends with it at the latest.
-
-    Parameters
-    ----------
-    *kinds : {"loop", "held", "pressed"}
-        The real-time loop; a body that is held and moved along one direction; one that a ball presses.
-    body : Touchable, optional
-        Body whose own kernels somebody else compiles meanwhile; `seconds` counts them.
-
-    Attributes
-    ----------
-    seconds : int
-        Time in s that it takes, about; 0 where nothing is to be done.
+    It is a context manager: the process ends with it at the latest. The kinds are "loop", the real-time loop; "held", a
+    body that is held and moved along one direction; "pressed", one that a ball presses. `body` is one whose own kernels
+    somebody else compiles meanwhile. `seconds` is about the time in s that all of it takes, 0 where nothing is to be
+    done.
     """
 
     def __init__(self, *kinds: str, body: Touchable | None = None) -> None:

@@ -42,7 +42,7 @@ import joblib, numpy
 from sklearn.gaussian_process import GaussianProcessRegressor
 rng = numpy.random.default_rng(0)
 X = rng.uniform(size=(12, 3))
-joblib.dump(GaussianProcessRegressor().fit(X, X.sum(axis=1)), {path!r})
+joblib.dump(GaussianProcessRegressor(optimizer=None).fit(X, X.sum(axis=1)), {path!r})
 """
 
 

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 from http.cookiejar import CookieJar
@@ -24,6 +25,7 @@ import pressed
 from palpate.cli.console import Console
 from palpate.cli.touch_page import TouchedPart
 from palpate.errors import UsageError
+from palpate.runtime import warm_up
 from palpate.study import Study
 from palpate.study.part_choices import shown_part
 from palpate.study.part_study import part_study
@@ -175,6 +177,25 @@ def test_the_work_on_a_part_begins_once(tmp_path):
     finally:
         touched.close()
     assert written == ["first"]
+
+
+def test_the_page_says_that_it_warms_up_before_a_body_is_in_the_hand(tmp_path, monkeypatch):
+    monkeypatch.setattr(warm_up, "is_ready", lambda own: False)
+    touched, seen, shown = TouchedPart(0.02, 60.0, 1, Console()), [], threading.Event()
+    body = SimpleNamespace(
+        show_progress=lambda progress: seen.append(progress.phase),
+        show_body=lambda path: shown.set(),
+        end=lambda words: None,
+        stopped=threading.Event(),
+    )
+    touched.page = body
+    try:
+        touched.begin(lambda: tmp_path / "no.toml")
+        touched._bodies.put("body.palpate")
+        assert shown.wait(60.0)
+    finally:
+        touched.close()
+    assert any(phase.startswith("warming up, ") for phase in seen)
 
 
 def test_it_stops_after_the_batch_that_is_solved(study, tmp_path, monkeypatch):

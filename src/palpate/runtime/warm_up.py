@@ -124,9 +124,12 @@ def main(kinds: Sequence[str]) -> None:
 
 
 def _compile_loop() -> None:
-    # meanwhile the loop's process compiles the rest of its body's energy, which waits for this part
-    _, _, felt, *_, grams, _, net = rod().energy.compiled()
-    second_order_into.translate(np.zeros(1), felt[0], felt[1:], grams, *net)
+    # meanwhile the loop's process compiles the rest of its body's energy, which waits for these parts
+    pressed = slab().energy
+    _, small, felt, base, place, numbers, *_, grams, arguments, net = pressed.compiled()
+    second_order_into.translate(place, felt[0], felt[1:], grams, *net)
+    leave: Any = pressed.baseline.compiled().leave
+    leave.translate(place, base, small, numbers, arguments)
     measure_timing(0.01)
     compile_blend()
 

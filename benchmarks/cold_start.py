@@ -1,6 +1,6 @@
 """The first minute on a machine: commands with an empty cache of kernels, and once more with what they left there.
 
-    python -m benchmarks.cold_start [--quick] [--json | --markdown] [--into FILE]
+    python -m benchmarks.cold_start [--quick] [--json] [--record]
 
 Each command gets a folder of its own for Numba's cache (``NUMBA_CACHE_DIR``), empty at first. `palpate demo` carries
 out both founding beams; `palpate touch --start` presses the kidney sample until it can be touched, which counts from

@@ -37,9 +37,11 @@ def rows(x, y):
 """
 
 
-@pytest.fixture
-def made(tmp_path):
-    """A module of a part and of kernels that nobody has compiled."""
+@pytest.fixture(params=[True, False], ids=["tried", "another Numba"])
+def made(request, tmp_path, monkeypatch):
+    """A module of a part and of kernels that nobody has compiled, where parts fit the version of Numba and where not."""
+    if not request.param:
+        monkeypatch.setattr("palpate.kernels._TRIED", ())
     (tmp_path / "made_kernels.py").write_text(SOURCE)
     spec = importlib.util.spec_from_file_location("made_kernels", tmp_path / "made_kernels.py")
     module = importlib.util.module_from_spec(spec)

@@ -48,6 +48,9 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False}
 _REFUSES = ctypes.cast(ctypes.pythonapi.PyObject_Call, ctypes.c_void_p).value
 
 
+_TRIED = (
+    (0, 68),
+)  # versions of Numba whose insides parts are known to fit; with others each is a kernel of its own
 _PATIENCE = 60.0  # s that another process may take to compile a kernel
 _asked: Counter[Any] = Counter()  # rows, of kernels that were not compiled
 
@@ -121,6 +124,10 @@ class _Kernel(CPUDispatcher):
         with global_compiler_lock, contextlib.nullcontext() if known else _only_one(self):
             return super().compile(sig)
 
+    def translate(self, *arguments: Any) -> None:
+        """Leave on disk what callers with such arguments need."""
+        self.compile(tuple(numba.typeof(argument) for argument in arguments))
+
 
 class _Part(_Kernel):
     """A part, which Python may call too, for tests; then its source is interpreted."""
@@ -131,13 +138,11 @@ class _Part(_Kernel):
     def enable_caching(self) -> None:
         self._cache = _PartCache(self.py_func)  # type: ignore[no-untyped-call]
 
-    def translate(self, *arguments: Any) -> None:
-        """Leave on disk what kernels need that call the part with such arguments."""
-        self.compile(tuple(numba.typeof(argument) for argument in arguments))
-
 
 def part(function: Callable[..., Any]) -> Any:
     """Return a function that kernels may call; it is compiled as a part of each."""
+    if numba.version_info.short not in _TRIED:
+        return kernel(function)
     own: Any = _Part(function, {}, {"nopython": True, **_OPTIONS}, pipeline_class=_PartCompiler)
     own.enable_caching()
     return own

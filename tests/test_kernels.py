@@ -39,7 +39,7 @@ def rows(x, y):
 
 @pytest.fixture(params=[True, False], ids=["tried", "another Numba"])
 def made(request, tmp_path, monkeypatch):
-    """A module of a part and of kernels that nobody has compiled, where parts fit the version of Numba and where not."""
+    """A module of a part and of kernels that nobody has compiled, with a Numba that parts fit and with another."""
     if not request.param:
         monkeypatch.setattr("palpate.kernels._TRIED", ())
     (tmp_path / "made_kernels.py").write_text(SOURCE)

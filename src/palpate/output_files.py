@@ -191,13 +191,9 @@ def is_own(path: Path) -> bool:
         return all(name + function in content for function in (b"_hash", b"_limits", b"_deviation"))
     if ending in {".json", ".fmu"}:
         return _is_card(content) if ending == ".json" else _is_fmu(path)
-    return ending == ".palpate" or _is_archive(
-        content
-    )  # nobody else has that ending, and a damaged one is no loss
-
-
-def _is_archive(content: bytes) -> bool:
-    """Return whether these are the bytes of a model file: an archive of safetensors whose header names palpate."""
+    if ending == ".palpate":  # nobody else has that ending, and a damaged one is no loss
+        return True
+    # an archive of safetensors whose header names palpate: a model file of another name
     return content[8:9] == b"{" and b'"palpate":' in content[8 : 8 + int.from_bytes(content[:8], "little")]
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import sys
 import threading
 import time
@@ -18,6 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from palpate.errors import PalpateError
+from palpate.format import json_data
 from palpate.input_files import plain_text
 
 __all__ = ["Console", "advice_in_words"]
@@ -78,7 +78,7 @@ class Console:
     def result(self, text: str, content: Mapping[str, Any]) -> None:
         """Print the result of a command to stdout."""
         # not-a-number is no JSON: it becomes null
-        shown = json.dumps(_finite(content), indent=2) if self.as_json else plain_text(text)
+        shown = json.dumps(json_data(content), indent=2) if self.as_json else plain_text(text)
         print(shown, flush=True)  # noqa: T201
 
     def error(self, error: PalpateError) -> None:
@@ -93,13 +93,3 @@ class Console:
         rich.print(Text.assemble(("error: ", "bold red"), (plain_text(error.what), "bold")))
         for line in filter(None, (error.why, error.fix)):
             rich.print(Text(plain_text(line)))
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(k): _finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

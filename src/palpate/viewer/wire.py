@@ -12,17 +12,16 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import struct
 import types
 import typing
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.format import json_data
 
 __all__ = ["Binary", "Json", "Layout", "Wire"]
 
@@ -141,7 +140,7 @@ class Json:
     def to_json(self) -> str:
         """Return the message as JSON; numbers that are not finite become null, which JSON can say."""
         values = dataclasses.asdict(typing.cast(Any, self))
-        return json.dumps({"kind": type(self).__name__} | _finite(values), allow_nan=False)
+        return json.dumps({"kind": type(self).__name__} | json_data(values), allow_nan=False)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
@@ -152,16 +151,6 @@ class Json:
             return typing.cast(Self, _build({cls.__name__: cls}[kind], values))
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise UsageError(f"This text is no {cls.__name__} message.", why=str(error)) from error
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(k): _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def _build(kind: Any, value: Any) -> Any:

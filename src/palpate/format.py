@@ -1,10 +1,12 @@
-"""Numbers as text for people: few digits, a fitting unit, a proper minus sign."""
+"""Numbers as text for people: few digits, a fitting unit, a proper minus sign; and values as data for JSON."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from palpate.units import Range
 
@@ -15,6 +17,7 @@ __all__ = [
     "criterion_figure",
     "duration",
     "interval",
+    "json_data",
     "length",
     "millimetres",
     "number",
@@ -164,3 +167,16 @@ def span(ends: float | tuple[float, float], unit: str) -> str:
     if isinstance(ends, tuple):
         return " … ".join(map(number, ends)) + f" {unit}"
     return f"{number(ends)} {unit}"
+
+
+def json_data(value: Any) -> Any:
+    """Return dataclasses, mappings, sequences and arrays as data for JSON; a float that is not finite becomes None."""
+    if dataclasses.is_dataclass(value):
+        return {f.name: json_data(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(k): json_data(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_data(v) for v in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return json_data(value.tolist()) if hasattr(value, "tolist") else value

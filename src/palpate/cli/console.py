@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from palpate.errors import PalpateError
+from palpate.format import json_data
 from palpate.input_files import plain_text
-from palpate.output_files import finite
 
 __all__ = ["Console", "advice_in_words"]
 
@@ -78,7 +78,7 @@ class Console:
     def result(self, text: str, content: Mapping[str, Any]) -> None:
         """Print the result of a command to stdout."""
         # not-a-number is no JSON: it becomes null
-        shown = json.dumps(finite(content), indent=2) if self.as_json else plain_text(text)
+        shown = json.dumps(json_data(content), indent=2) if self.as_json else plain_text(text)
         print(shown, flush=True)  # noqa: T201
 
     def error(self, error: PalpateError) -> None:

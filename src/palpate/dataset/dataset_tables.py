@@ -109,14 +109,10 @@ def _units(text: str, count: int) -> list[str]:
     return parts if len(parts) == count else [text if "," not in text else ""] * count
 
 
-def _column_heads(columns: list[tuple[str, str, np.ndarray]]) -> list[str]:
-    return [f"{name} [{unit}]" if unit else name for name, unit, _ in columns]
-
-
 def _write_csv(target: Path, columns: list[tuple[str, str, np.ndarray]]) -> Path:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_column_heads(columns))
+    writer.writerow([f"{name} [{unit}]" if unit else name for name, unit, _ in columns])
     cells = [_cells(values) for _, _, values in columns]
     writer.writerows(zip(*cells, strict=True))
     return write_file(target, text.getvalue())

@@ -145,7 +145,7 @@ def _picked(
             covered[other] = True
         if np.array_equal(mask, before & ~covered):
             continue  # as the study says it, less what is held now, which goes over it
-        name, faces = _free_name(role, skin), _whole_faces(skin, mask)
+        name, faces = (role if role not in skin.surfaces else f"{role} by hand"), _whole_faces(skin, mask)
         surfaces = [surface for surface in surfaces if surface["name"] != name]
         if mask.any():
             if not faces and getattr(body.bare(), "is_cad", False):
@@ -178,11 +178,6 @@ def _whole_faces(skin: BodyMesh, mask: np.ndarray) -> tuple[str, ...]:
     if not np.array_equal(np.isin(skin.surface_of, numbers), mask):
         return ()
     return tuple(skin.surfaces[number] for number in numbers)
-
-
-def _free_name(role: str, skin: BodyMesh) -> str:
-    """Return the name for what was picked; one that no face of the file has."""
-    return role if role not in skin.surfaces else f"{role} by hand"
 
 
 def _require_surfaces(held: np.ndarray, touched: np.ndarray) -> None:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from palpate.dataset import Dataset
 from palpate.errors import AccuracyError
-from palpate.format import count, criterion_figure
+from palpate.format import count, criterion_figure, json_data
 from palpate.learning import History
 from palpate.learning.learn_dataset import LearningHistory
 from palpate.validation.figures import FIGURES
@@ -105,7 +101,7 @@ class Validation:
         missed = f"{len(self.failures)} of {len(self.checks)} limits"
         raise AccuracyError(
             f"{self.name} misses {missed} on {self.samples} solves that it has never seen.",
-            why="\n".join(_without_fix(c) for c in self.failures),
+            why="\n".join(str(c).removesuffix(c.criterion.fix).rstrip() for c in self.failures),
             fix=" ".join(dict.fromkeys(c.criterion.fix for c in self.failures)),
         )
 
@@ -125,7 +121,7 @@ class Validation:
         ]
         data = {"passed": self.passed, "name": self.name, "samples": self.samples}
         data |= {"caution": self.caution, "notes": self.notes}
-        plain: dict[str, Any] = _plain({**data, **self.figures, "checks": checks})
+        plain: dict[str, Any] = json_data({**data, **self.figures, "checks": checks})
         return plain
 
     def summary(self) -> dict[str, Any]:
@@ -251,22 +247,3 @@ def checks(figures: Any, limits: Limits, fixes: Mapping[str, str]) -> tuple[Chec
             advised = replace(criterion, fix=fixes.get(criterion.key, criterion.fix))
             found.append(Check(advised, value, limit, str(worst) if worst else ""))
     return tuple(found)
-
-
-def _without_fix(check: Check) -> str:
-    return str(check).removesuffix(check.criterion.fix).rstrip()
-
-
-def _plain(value: Any) -> Any:
-    """Dataclasses, arrays and mappings as JSON-able data."""
-    if dataclasses.is_dataclass(value):
-        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value

@@ -10,21 +10,18 @@ no such place, and are never replaced unasked.
     require_outputs   refuses names that can't be written to, or whose files are not palpate's to replace
     free_path         a name beside somebody else's file, where refusing would lose a result
     with_seal         a text with the line that lets a later export replace it
-    finite            data whose numbers JSON can say
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import math
 import os
 import re
 import tomllib
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from palpate.errors import UsageError
 from palpate.files import require_regular
@@ -32,7 +29,6 @@ from palpate.files import require_regular
 __all__ = [
     "SAMPLE_HEAD",
     "STUDY_HEAD",
-    "finite",
     "free_path",
     "is_marked",
     "is_own",
@@ -245,12 +241,3 @@ def _is_fmu(path: Path) -> bool:
             return b'generationTool="palpate ' in file.read("modelDescription.xml")
     except (zipfile.BadZipFile, KeyError):
         return False
-
-
-def finite(value: Any) -> Any:
-    """Return plain data whose numbers JSON can say: those that are not finite become None."""
-    if isinstance(value, Mapping):
-        return {str(k): finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

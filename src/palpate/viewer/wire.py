@@ -21,7 +21,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.output_files import finite
+from palpate.format import json_data
 
 __all__ = ["Binary", "Json", "Layout", "Wire"]
 
@@ -140,7 +140,7 @@ class Json:
     def to_json(self) -> str:
         """Return the message as JSON; numbers that are not finite become null, which JSON can say."""
         values = dataclasses.asdict(typing.cast(Any, self))
-        return json.dumps({"kind": type(self).__name__} | finite(values), allow_nan=False)
+        return json.dumps({"kind": type(self).__name__} | json_data(values), allow_nan=False)
 
     @classmethod
     def from_json(cls, text: str) -> Self:

@@ -181,8 +181,8 @@ class _SwitchedEnergy:
     def __init__(self, energy: Any, switch: _Switch) -> None:
         self._energy, self._switch = energy, switch
 
-    def evaluator(self) -> _SwitchedAnswer:
-        return _SwitchedAnswer(self._energy.evaluator(), self._switch)
+    def evaluator(self, *, few: bool = False) -> _SwitchedAnswer:
+        return _SwitchedAnswer(self._energy.evaluator(few=few), self._switch)
 
     def __getattr__(self, name: str) -> Any:
         if name in {"_energy", "_switch"}:

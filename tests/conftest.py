@@ -36,8 +36,19 @@ def pytest_xdist_setupnodes(config: pytest.Config) -> None:
         config.pluginmanager.get_plugin("terminalreporter").write_line(kernels.compile_all())
 
 
+@pytest.hookimpl(tryfirst=True)  # before tests are left out by their marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the long files first: what a worker takes last is short, and no core waits at the end."""
+    """Leave all cases of a grid but the first to the full tier, and put the long files first.
+
+    What a worker takes last is then short, and no core waits at the end.
+    """
+    begun: set[str] = set()
+    for item in items:
+        function = item.nodeid.partition("[")[0]
+        if item.get_closest_marker("grid"):
+            if function in begun:
+                item.add_marker(pytest.mark.full)
+            begun.add(function)
     places = {name: place for place, name in enumerate(LONG_FILES)}
     items.sort(key=lambda item: places.get(item.nodeid.partition("::")[0], len(places)))
 

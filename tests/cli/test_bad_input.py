@@ -97,6 +97,7 @@ def copy(carried_out, tmp_path):
     return shutil.copytree(carried_out, tmp_path / "copy")
 
 
+@pytest.mark.full
 def test_missing_and_corrupt_dataset(palpate, copy):
     metadata = copy / "small.zarr" / "zarr.json"
     metadata.write_bytes(metadata.read_bytes()[:-50])
@@ -227,6 +228,7 @@ def files(tmp_path_factory):
     return folder
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("command", "words"),
     [

@@ -41,6 +41,7 @@ def test_python_m_palpate_is_palpate():
     assert done.stdout == f"palpate {__version__}\n"
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", preset_names())
 def test_init_writes_a_study_that_reads_back_as_the_preset(palpate, tmp_path, name):
     path = tmp_path / "mine.toml"
@@ -73,6 +74,7 @@ def test_init_replaces_a_study_where_that_is_asked_and_nothing_else(palpate, tmp
     assert read_study(path).name == "study"
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", ["scan.xyz", "notes.txt", "model.palpate", "data.zarr", "scan", "scan.gz"])
 def test_only_a_toml_file_is_a_target_of_init(palpate, tmp_path, name):
     path = tmp_path / name

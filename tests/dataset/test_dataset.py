@@ -237,6 +237,7 @@ DAMAGES = [
 ]
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_every_damage_is_noticed_and_named(stored, damage):
     damage(stored)

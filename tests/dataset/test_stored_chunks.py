@@ -104,6 +104,7 @@ DAMAGES = [
 ]
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("name", "damage"),
     [*(("displacement", damage) for damage in DAMAGES), *((name, flip) for name in ("inputs", "message"))],

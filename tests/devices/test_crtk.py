@@ -374,6 +374,7 @@ def test_late_doubled_and_lost_messages_are_no_fresh_samples(service, device, ri
     assert ages[-1] == pytest.approx(0.0, abs=1e-5)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("state", "homed", "words"),
     [

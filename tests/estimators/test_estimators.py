@@ -282,6 +282,7 @@ def test_deviations_of_few_samples_are_of_the_errors_size(wave):
         assert np.median(model.predict(X[15:], return_std=True)[1]) < 2 * np.std(y)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("settings", [None, "shared", "emran"])
 def test_the_filter_knows_its_deviation(settings, wave):
     X, y = wave

@@ -309,6 +309,7 @@ def test_nodes_are_named_by_what_they_work_out(tmp_path):
     }
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("compiler", ["g++", pytest.param("clang++", marks=pytest.mark.full)])
 @pytest.mark.parametrize("name", ["contact", "iwan", pytest.param("relaxation", marks=pytest.mark.full)])
 @pytest.mark.parametrize("single", [False, True])

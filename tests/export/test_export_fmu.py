@@ -42,6 +42,7 @@ def files(tmp_path_factory):
     return folder
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", NAMES)
 def test_it_answers_as_palpate_does(name, version, files):

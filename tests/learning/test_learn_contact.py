@@ -214,6 +214,7 @@ def learnt(surface):
     )
 
 
+@pytest.mark.full
 def test_a_smooth_body_is_learnt_from_a_few_solves(learnt):
     X, U, F, K = touches(200, seed=1)
     s = learnt[0]

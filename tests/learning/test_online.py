@@ -156,6 +156,7 @@ STREAMS = {
 }
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("update", ["full", "decoupled", "winner", "shared", "gradient"])
 @pytest.mark.parametrize("name", STREAMS)
 def test_no_stream_of_numbers_stops_the_loop(name, update):

@@ -18,6 +18,8 @@ from sources import FUNCTIONS, files, package_of, tree
 
 from palpate import errors
 
+pytestmark = pytest.mark.full  # the house's own rules, not what palpate does
+
 TABLES = re.compile(r"^(Parameters|Other Parameters|Attributes|Returns|Yields|Raises)\n-{3,}$", re.MULTILINE)
 CARRIED_BY_PROSE = 3  # arguments of an exported function that a sentence can name; more need the table
 # Exported methods hand their options on to these and refer to them.

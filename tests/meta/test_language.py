@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from sources import FUNCTIONS, ROOT, files, package_of, tree
 
+pytestmark = pytest.mark.full  # the house's own rules, not what palpate does
+
 CLAUSE = re.compile(r"(What|Whether|How|Of|The same)\b")
 
 # Terms of earlier versions: docs/concepts/glossary.md has those that took their place.

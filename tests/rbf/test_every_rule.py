@@ -55,6 +55,7 @@ def wave(x):
     return np.array([np.sin(3 * x[0]) + 0.3 * np.sign(x[0]), np.cos(2 * x[0])])
 
 
+@pytest.mark.grid
 @every_rule
 def test_learns_a_smooth_map_better_than_its_mean(rule):
     X, Y = stiffening(120)
@@ -66,6 +67,7 @@ def test_learns_a_smooth_map_better_than_its_mean(rule):
     assert learned.history.heldout[-1] < 0.2 * spread
 
 
+@pytest.mark.grid
 @every_rule
 def test_the_old_state_is_untouched_and_a_donated_one_gives_the_same_bits(rule):
     settings = eager(rule)
@@ -94,6 +96,7 @@ def test_an_observation_that_is_not_finite_is_skipped_and_says_so(rule):
     assert event.why == "not finite"
 
 
+@pytest.mark.grid
 @every_rule
 def test_seed_decides_every_bit(rule):
     X, Y = stiffening(40)

@@ -67,6 +67,7 @@ class Touch:
         return math.sqrt(np.mean(np.square(self.speeds[round(since / self.loop.period) :])))
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("shape", ["random", "adversarial"])
 @pytest.mark.parametrize("pace", [FAST, SLOW], ids=["1 kHz", "200 Hz, 5 ms"])
 @pytest.mark.parametrize("name", list(BODIES))
@@ -80,6 +81,7 @@ def test_no_more_energy_than_sampling_leaks(name, pace, shape):
     assert touch.hand.work <= own + 1e-9
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("pace", [FAST, SLOW], ids=["1 kHz", "200 Hz, 5 ms"])
 @pytest.mark.parametrize("name", list(BODIES))
 def test_a_hand_in_contact_comes_to_rest(name, pace):

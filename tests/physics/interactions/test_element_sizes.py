@@ -15,6 +15,7 @@ GEL = NeoHookean(young=9e3, poisson=0.4)
 RADIUS = 0.008
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("shape", "share"),
     [

@@ -63,6 +63,7 @@ def test_the_slope_of_the_energy_is_the_stress_of_the_general_solver(law, mode, 
     np.testing.assert_allclose(stress_in_test(law, record), record.stress, rtol=1e-8, atol=1e-6)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("name", "law", "constants"),
     [

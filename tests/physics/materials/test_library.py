@@ -31,6 +31,7 @@ def test_each_is_sourced_plain_data_and_a_value(name):
     assert name in str(material)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("material", ELASTIC, ids=lambda m: m.name)
 def test_each_is_stable_over_its_strains(material):
     high = 0.05 if isinstance(material, LinearElastic) else 1.0

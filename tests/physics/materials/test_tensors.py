@@ -58,6 +58,7 @@ SCALARS = {
 }
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", TENSORS)
 def test_tensors_are_the_same_in_both_worlds(name, point):
     function = TENSORS[name]

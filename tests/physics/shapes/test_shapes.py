@@ -187,6 +187,7 @@ def test_a_rectangle_of_a_few_millimetres_is_fine_too(size):
     assert 2 * 36 < count < 6 * 36  # equilateral ones would be 4/√3 for each square of that edge
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     "shape",
     [

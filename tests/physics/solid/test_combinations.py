@@ -107,6 +107,7 @@ SLOW = {"layered", "organ", "tube", "stl"}  # many elements
 MARKED = {kind: pytest.param(kind, marks=pytest.mark.full) if kind in SLOW else kind for kind in BODIES}
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("kind", MARKED.values())
 def test_force_energy_and_reactions_belong_together(kind, tmp_path):
     problem, touching, normal = BODIES[kind](tmp_path)

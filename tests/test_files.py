@@ -157,6 +157,7 @@ data.take([0]).save(sys.argv[1], overwrite=True)
 """
 
 
+@pytest.mark.full
 def test_a_dataset_that_a_killed_process_was_replacing_is_taken_back(tmp_path):
     """It is killed after the old one has been moved aside, before the new one takes its place."""
     old = dataset(4)
@@ -193,6 +194,7 @@ def held_folder(tmp_path):
     return process, process.stdout.readline().strip()
 
 
+@pytest.mark.full
 def test_sigterm_removes_temporary_folders(tmp_path):
     process, folder = held_folder(tmp_path)
     assert names(tmp_path) == [os.path.basename(folder)]
@@ -202,6 +204,7 @@ def test_sigterm_removes_temporary_folders(tmp_path):
     assert names(tmp_path) == []
 
 
+@pytest.mark.full
 def test_folders_of_killed_processes_go_with_the_next_start(tmp_path, monkeypatch):
     killed, stale = held_folder(tmp_path)
     running, alive = held_folder(tmp_path)

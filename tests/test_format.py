@@ -102,6 +102,7 @@ def test_figures_of_a_record_are_written_as_the_table_of_limits_writes_them() ->
     assert summary_figure("limits kept", True) is True
 
 
+@pytest.mark.full
 @given(
     st.recursive(st.none() | st.floats(allow_nan=False) | st.text(), lambda v: st.dictionaries(st.text(), v))
 )

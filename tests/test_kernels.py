@@ -104,6 +104,7 @@ def test_nothing_is_started_where_all_is_ready(monkeypatch):
         assert warm.words == ""
 
 
+@pytest.mark.full
 def test_a_person_is_told_how_long_it_takes_and_the_process_ends_with_its_command(monkeypatch):
     monkeypatch.setattr(warm_up, "is_ready", lambda own: False)
     with WarmUp("held", "loop") as warm:
@@ -123,6 +124,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
+@pytest.mark.full
 def test_it_outlives_no_command_that_was_killed(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))  # empty: there is work for a while
     done = subprocess.run([sys.executable, "-c", KILLED], capture_output=True, text=True, check=False)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from palpate.units import Range
 
@@ -17,7 +15,6 @@ __all__ = [
     "criterion_figure",
     "duration",
     "interval",
-    "json_data",
     "length",
     "millimetres",
     "number",
@@ -167,16 +164,3 @@ def span(ends: float | tuple[float, float], unit: str) -> str:
     if isinstance(ends, tuple):
         return " … ".join(map(number, ends)) + f" {unit}"
     return f"{number(ends)} {unit}"
-
-
-def json_data(value: Any) -> Any:
-    """Return dataclasses, mappings, sequences and arrays as data for JSON; a float that is not finite becomes None."""
-    if dataclasses.is_dataclass(value):
-        return {f.name: json_data(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    if isinstance(value, Mapping):
-        return {str(k): json_data(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [json_data(v) for v in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return json_data(value.tolist()) if hasattr(value, "tolist") else value

@@ -9,19 +9,23 @@ no such place, and are never replaced unasked.
 
     require_outputs   refuses names that can't be written to, or whose files are not palpate's to replace
     free_path         a name beside somebody else's file, where refusing would lose a result
+    json_data         records and arrays as data that JSON can say
     with_seal         a text with the line that lets a later export replace it
 """
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
+import math
 import os
 import re
 import tomllib
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from palpate.errors import UsageError
 from palpate.files import require_regular
@@ -32,6 +36,7 @@ __all__ = [
     "free_path",
     "is_marked",
     "is_own",
+    "json_data",
     "picture_metadata",
     "require_outputs",
     "seal",
@@ -241,3 +246,16 @@ def _is_fmu(path: Path) -> bool:
             return b'generationTool="palpate ' in file.read("modelDescription.xml")
     except (zipfile.BadZipFile, KeyError):
         return False
+
+
+def json_data(value: Any) -> Any:
+    """Return dataclasses, mappings, sequences and arrays as data for JSON; a float that is not finite becomes None."""
+    if dataclasses.is_dataclass(value):
+        return {f.name: json_data(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(k): json_data(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_data(v) for v in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return json_data(value.tolist()) if hasattr(value, "tolist") else value

@@ -215,6 +215,7 @@ def test_interpolation_takes_its_training_forces(case):
     assert np.allclose(model.force(train.X), train.force, atol=1e-6 * np.abs(train.force).max())
 
 
+@pytest.mark.full
 def test_no_rival_feels_anything_without_contact(case):
     away = np.array([[0.02, 0.02, HEIGHT + R + 1e-4]])
     for rival in RIVALS.values():

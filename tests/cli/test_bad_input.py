@@ -148,6 +148,7 @@ def test_a_missed_target_is_exit_code_one_after_the_report_is_written(palpate, c
     assert "RMSE" in answer.err
 
 
+@pytest.mark.full
 def test_a_busy_port(palpate, copy):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

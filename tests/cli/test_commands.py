@@ -163,6 +163,7 @@ def test_sweep_and_learn_write_what_they_say_and_what_is_shipped(carried_out, tm
     np.testing.assert_allclose(shipped, force, atol=1e-4)
 
 
+@pytest.mark.full
 def test_a_finished_sweep_is_not_solved_again(palpate, carried_out):
     before = Dataset.open(carried_out / "small.zarr").provenance["created"]
     assert palpate("sweep", carried_out / "study.toml").code == 0
@@ -211,6 +212,7 @@ def test_learning_again_gives_the_same_model_bit_for_bit_and_results_for_machine
         np.testing.assert_array_equal(same.network.weights, made.network.weights)
 
 
+@pytest.mark.full
 def test_run_reports_the_loop(palpate, carried_out):
     answer = palpate("run", carried_out / "small.palpate", "--seconds", "0.5", "--json")
     assert answer.code == 0
@@ -265,6 +267,7 @@ def test_a_simulated_device_says_where_it_listens(palpate):
     assert palpate("devices", "simulate", "omega").code == 2
 
 
+@pytest.mark.full
 def test_the_double_of_a_library_says_how_it_is_used(palpate, c_compiler, tmp_path):
     answer = palpate(
         "devices", "simulate", "forcedimension", "--folder", tmp_path / "new", "--type", "falcon", "--json"

@@ -56,6 +56,7 @@ def started(folder, *words):
     return subprocess.Popen(command, cwd=folder, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
 
 
+@pytest.mark.full
 def test_a_file_corrects_a_model(palpate, folder):
     X, F = measured()
     write_measurements(folder / "specimen.csv", X, F)
@@ -86,6 +87,7 @@ def test_forces_that_can_hardly_be_this_bodys_are_a_failure_that_loses_nothing(p
     assert said in json.loads(palpate(*words, "--json").out)["warning"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("factor", "more", "said"),
     [(1e3 * FACTOR, ("--offset", "0.005"), "units (pounds"), (-1e3, (), "Change their sign")],
@@ -173,6 +175,7 @@ def test_a_connection_to_a_real_process(folder):
     assert follows(folder / "new.touch")
 
 
+@pytest.mark.full
 def test_a_family_takes_its_parameters_with_units(palpate, tmp_path):
     S = model(extra=[MODULUS])
     Surrogate(S).save(tmp_path / "family.touch")
@@ -198,6 +201,7 @@ def test_a_family_takes_its_parameters_with_units(palpate, tmp_path):
         assert named in " ".join(answer.err.split())
 
 
+@pytest.mark.full
 def test_what_can_not_be_is_refused_with_its_reason(palpate, folder):
     model_, out = folder / "model.touch", folder / "new.touch"
     (folder / "bad.csv").write_text("x [mm],y [mm],z [mm],Fz [N]\n1,2,3,four\n")

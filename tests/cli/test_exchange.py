@@ -16,6 +16,7 @@ def folder(carried_out, tmp_path):
     return tmp_path / "study"
 
 
+@pytest.mark.full
 def test_a_dataset_goes_out_in_every_format(palpate, folder):
     for ending in ("csv", "parquet", "nc", "pvd", "glb"):
         answer = palpate("dataset", "export", folder / "small.zarr", "-o", folder / f"out.{ending}", "--json")
@@ -87,6 +88,7 @@ def test_a_beam_goes_out_without_its_shape_and_says_so(palpate, folder):
     assert "left out" not in palpate("export", "c", folder / "small.palpate", "--no-check", "--no-field").err
 
 
+@pytest.mark.full
 def test_a_card_is_printed_signed_and_written(palpate, folder):
     model = folder / "small.palpate"
     answer = palpate("card", model)

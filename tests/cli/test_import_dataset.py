@@ -38,6 +38,7 @@ def test_a_dry_run_with_a_mapping_tells_what_would_be_written(palpate, export):
     assert list(export.parent.iterdir()) == [export]
 
 
+@pytest.mark.full
 def test_a_dataset_and_its_test_set_are_written(palpate, export):
     words = ("dataset", "import", export, "--input", "load=F", "--output", "sag=v", "--test", "0.2")
     answer = palpate(*words)

@@ -42,6 +42,7 @@ def modulus(palpate, *words):
 STRAIN = np.linspace(0.0, 0.8, 21)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("names", "decimal"),
     [
@@ -110,6 +111,7 @@ def test_each_file_has_its_own_size(palpate, tmp_path):
 PRESSED = np.linspace(0.0, 0.4, 21)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("name", "head", "signs", "words"),
     [

@@ -54,6 +54,7 @@ def test_the_warning_of_a_correction_is_told_again(palpate, tmp_path):
     assert "its correction was warned of: Change their sign." in answer.err
 
 
+@pytest.mark.full
 def test_a_pad_is_pulled_by_the_script(palpate, tmp_path):
     file = pad().save(tmp_path / "pad.palpate")
     answer = palpate("run", file, "--seconds", "0.5", "--device", "stroke:frequency=2")
@@ -84,6 +85,7 @@ def test_a_body_too_stiff_for_its_device_is_softened_and_that_is_told(palpate, t
 SERVICES = [("haply", ("--port", "0", "--events", "0"), 0.10), ("crtk", ("--port", "0"), 0.05)]
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("device", "options", "radius"), SERVICES, ids=["haply", "crtk"])
 @pytest.mark.parametrize("given", [True, False], ids=["for the body", "by default"])
 def test_the_double_of_a_service_strokes_within_the_training(palpate, file, device, options, radius, given):

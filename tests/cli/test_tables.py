@@ -46,6 +46,7 @@ def learnt(bench):
     return bench.with_suffix(".palpate")
 
 
+@pytest.mark.full
 def test_a_table_is_learnt_in_si_units_by_the_names_of_its_columns(learnt):
     found = pp.load(learnt)
     assert [(r.name, r.unit) for r in found.network.inputs] == [("depth", "m"), ("speed", "m/s")]
@@ -89,6 +90,7 @@ def test_fit_says_what_it_left_out_and_what_it_lacks(palpate, bench, learnt, tmp
         assert (answer.code, said in " ".join(answer.err.split())) == (2, True), answer.err
 
 
+@pytest.mark.full
 @pytest.mark.filterwarnings("ignore::palpate.errors.FitWarning")
 def test_a_wild_row_is_named_by_its_line(palpate, tmp_path):
     rng = np.random.default_rng(0)

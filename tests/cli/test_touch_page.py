@@ -179,6 +179,7 @@ def test_the_work_on_a_part_begins_once(tmp_path):
     assert written == ["first"]
 
 
+@pytest.mark.full
 def test_the_page_says_that_it_warms_up_before_a_body_is_in_the_hand(tmp_path, monkeypatch):
     monkeypatch.setattr(warm_up, "is_ready", lambda own: False)
     touched, seen, shown = TouchedPart(0.02, 60.0, 1, Console()), [], threading.Event()

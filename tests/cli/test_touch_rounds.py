@@ -52,6 +52,7 @@ def test_it_goes_on_with_the_study_that_init_has_written(palpate, asked, tmp_pat
     assert [path.name for path in tmp_path.glob("*.toml")] == ["left-pad.toml"]
 
 
+@pytest.mark.full
 def test_a_choice_that_does_not_suit_is_no_missed_target(palpate, asked, tmp_path):
     answer = palpate("touch", box(tmp_path / "pad.stl"), "--poisson", "0.7", "--no-view")
     assert answer.code == 2
@@ -71,6 +72,7 @@ def test_quantities_behind_options_are_read_as_they_are_written(palpate, asked, 
     assert study.interaction.depth[1] == 0.0035
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("options", "words"),
     [

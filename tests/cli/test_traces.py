@@ -80,6 +80,7 @@ def test_a_replay_says_that_it_is_the_same_or_by_how_much_it_is_not(palpate, tra
     assert palpate("trace", "compare", trace).code == UsageError.exit_code
 
 
+@pytest.mark.full
 def test_a_recording_that_never_began_is_told_and_no_option_is_passed_over(palpate, trace, tmp_path):
     path = tmp_path / "a.trace"
     TraceWriter(path, {"device": "page"}).abandon()
@@ -103,6 +104,7 @@ def test_a_model_that_is_gone_is_asked_for(palpate, trace, tmp_path):
         moved.rename(trace.parent / "slab.palpate")
 
 
+@pytest.mark.full
 def test_a_table_holds_every_bit(palpate, trace, tmp_path):
     known = trace_table(read_trace(trace))
     assert palpate("trace", "export", trace, "--out", tmp_path / "t.csv").code == 0
@@ -129,6 +131,7 @@ def test_a_table_in_parquet(palpate, trace, tmp_path):
     np.testing.assert_array_equal(table["force_z"].to_numpy(), trace_table(read_trace(trace))["force_z"])
 
 
+@pytest.mark.full
 def test_a_plot_has_the_solves_beside_the_stroke(palpate, trace, tmp_path):
     X = np.zeros((60, 3))
     X[:, 2] = slab.RADIUS - np.linspace(0.0005, 0.0045, 60)

@@ -20,6 +20,7 @@ def folder(tmp_path):
     return tmp_path
 
 
+@pytest.mark.full
 def test_a_good_surrogate_is_told_from_its_file_and_passes(palpate, folder):
     answer = palpate("validate", folder / "slab.palpate")
     assert answer.code == 0, answer.err

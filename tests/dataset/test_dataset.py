@@ -130,6 +130,7 @@ def test_the_hash_is_of_the_answers_not_of_the_timings():
     assert make(seed=1).hash != data.hash
 
 
+@pytest.mark.full
 def test_saving_again_is_harmless_and_other_data_are_refused(stored):
     make(failed=(3,)).save(stored)
     with pytest.raises(UsageError, match="exists already"):
@@ -295,6 +296,7 @@ def test_a_dataset_without_strains_is_read_and_joined(stored):
         np.testing.assert_array_equal(np.flatnonzero(np.isfinite(found)), np.arange(40)[known])
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("version", [4, 99, "1", None])
 def test_a_later_format_asks_for_a_newer_palpate(stored, version):
     edit_metadata(stored, lambda metadata: metadata["attributes"].update(format_version=version))

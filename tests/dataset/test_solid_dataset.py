@@ -104,6 +104,7 @@ def test_two_meshes_are_not_joined():
         Dataset.concat([make(), make(rest=REST * 1.001)])
 
 
+@pytest.mark.full
 def test_large_fields_are_stored_by_whole_samples(tmp_path):
     import zarr
 

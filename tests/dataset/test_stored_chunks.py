@@ -62,6 +62,7 @@ def test_the_promise_of_an_honest_chunk_is_its_size(codec, length):
         assert promised_size(codec, chunk[:HEAD], len(chunk)) == length
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", ["displacement", "message", "sample"])
 def test_thirteen_bytes_that_promise_four_gigabytes_are_refused(store, name):
     (chunk,) = (file for file in (store / name / "c").rglob("*") if file.is_file())
@@ -104,6 +105,7 @@ DAMAGES = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.grid
 @pytest.mark.parametrize(
     ("name", "damage"),
@@ -121,6 +123,7 @@ def test_a_damaged_chunk_costs_its_rows(tmp_path, name, damage):
     assert data.hash == kept.take(rows).hash
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", ["sample", "rest", "input_low"])
 def test_damage_beside_the_rows_is_refused(tmp_path, name):
     whole = make_store(tmp_path, 640)
@@ -129,6 +132,7 @@ def test_damage_beside_the_rows_is_refused(tmp_path, name):
     assert "corrupt" in refusal(whole)
 
 
+@pytest.mark.full
 def test_damaged_rows_excuse_no_other_change(tmp_path):
     whole = make_store(tmp_path, 640)
     flip(whole / "inputs" / "c" / "1" / "0")
@@ -142,6 +146,7 @@ def test_a_chunk_of_another_size_than_its_array_is_refused(store):
     assert "80,000 bytes where 512 belong" in refusal(store)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     "change", [{"shape": [10**15, 1]}, {"data_type": "float63"}, {"codecs": [{"name": "gzip"}]}]
 )

@@ -341,6 +341,7 @@ def test_the_delay_softens_a_body(plain, shared):
         loop.end()
 
 
+@pytest.mark.full
 def test_the_round_trip_is_measured(monkeypatch):
     monkeypatch.setattr(crtk, "LONGEST_DELAY", 60.0)  # the machine may have much else to do
     with CrtkRig(rate=200.0) as rig:

@@ -163,6 +163,7 @@ def growth_per_tick(rig):
     return min(np.diff(kept)) / STRETCH
 
 
+@pytest.mark.grid
 def test_keeps_no_memory_per_tick(rig):
     assert growth_per_tick(rig) < 2.0, "the least that a list can grow by is a pointer of eight bytes"
 
@@ -180,6 +181,7 @@ class LeakingHand(StrokeDevice):
 """
 
 
+@pytest.mark.full
 def test_a_driver_that_keeps_a_pointer_a_tick_is_found():
     names = {}
     exec(compile(LEAK, str(Path(devices.__file__).with_name("leaking.py")), "exec"), names)
@@ -211,6 +213,7 @@ class Sensor:
         return self._sample
 
 
+@pytest.mark.grid
 def test_a_noisy_sensor_of_any_device_does_not_shake_the_force(rig, shared):
     """From tick to tick the force changes by what a spring answers to way and noise, and not by more than 12 K σ."""
     traits, places, forces = rig.device.traits, [], []

@@ -27,6 +27,7 @@ def test_every_double_compiles_and_loads(double, device):
     assert LIBRARIES[device].load(str(double(device)))
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     "module", ["palpate.devices", "palpate.devices.device_search", "palpate.runtime.child"]
 )

@@ -327,6 +327,7 @@ device.close()
 """
 
 
+@pytest.mark.full
 def test_a_pad_is_read_through_the_package_as_the_kernel_shows_it(tmp_path):
     """The package itself asks a pad that umockdev pretends to be: by the kernel's files, requests and events."""
     require_package("evdev", "gamepad")

@@ -202,6 +202,7 @@ STOPPING = [
 ]
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(("name", "data"), STOPPING, ids=str)
 def test_events_of_safety_are_zero_force_and_a_reason(service, loop, name, data, rig):
     rig.run(100)
@@ -324,6 +325,7 @@ def test_the_button_of_a_wired_grip_stops_holds_and_is_the_dead_mans(plain, shar
         device.close()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("grip", ["wired", "wireless"])
 def test_a_dead_man_button_gives_force_while_it_is_held(plain, shared, grip):
     button = {"wired": "button", "wireless": "a"}[grip]
@@ -389,6 +391,7 @@ def test_a_grip_whose_buttons_are_not_understood_is_said():
         device.close()
 
 
+@pytest.mark.full
 def test_a_dead_man_button_that_is_not_there_is_refused(spring_file):
     """Only the opened device knows its grips: here the one button is the hand."""
     with HaplySimulator(SimulatorSettings(port=0, events=0, grip="wired")) as service:

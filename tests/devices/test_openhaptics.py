@@ -187,6 +187,7 @@ def test_any_other_error_ends_the_callback_with_zero_force(rig, device, library,
         device.read(0.0)
 
 
+@pytest.mark.full
 def test_a_user_can_try_its_faults(double, shared):
     """As `palpate devices simulate openhaptics` compiles it."""
     simulated = LibraryDouble(double("openhaptics", MODEL=3.0, LOST_AFTER=2000.0, WARM_EVERY=500.0), speed=5)
@@ -331,6 +332,7 @@ def test_neither_side_sees_half_of_what_the_other_wrote(library):
     assert library.largest > 0.0
 
 
+@pytest.mark.full
 def test_a_process_touches_through_the_library(library, spring_file):
     with LoopProcess(spring_file, device=f"openhaptics:library={library.path}") as loop:
         state = loop.read()

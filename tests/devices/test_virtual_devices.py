@@ -19,6 +19,7 @@ targets = st.lists(
 )
 
 
+@pytest.mark.full
 @settings(deadline=None)
 @given(targets)
 def test_interpolation_never_overshoots(frames):

@@ -44,6 +44,7 @@ def array_api(monkeypatch):
     monkeypatch.setenv("SCIPY_ARRAY_API", "1")
 
 
+@pytest.mark.grid
 @pytest.mark.usefixtures("array_api")
 @parametrize_with_checks([RBFNetworkRegressor()])
 def test_conventions(estimator, check):
@@ -145,6 +146,7 @@ def test_outputs_of_different_size_are_learnt_alike(model, wave):
     assert np.ptp(each.network_.scaling.output_scale) > 0.0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("model", BOTH)
 def test_constant_columns_survive(model, wave):
     X, y = wave
@@ -231,6 +233,7 @@ def test_samples_of_no_weight_are_passed_over(wave):
             model.fit(X, y, sample_weight=wrong)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("model", BOTH)
 def test_names_and_ranges_reach_the_network(model, wave, tmp_path):
     X, y = wave
@@ -282,6 +285,7 @@ def test_deviations_of_few_samples_are_of_the_errors_size(wave):
         assert np.median(model.predict(X[15:], return_std=True)[1]) < 2 * np.std(y)
 
 
+@pytest.mark.full
 @pytest.mark.grid
 @pytest.mark.parametrize("settings", [None, "shared", "emran"])
 def test_the_filter_knows_its_deviation(settings, wave):
@@ -340,6 +344,7 @@ WRONG = {
 }
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("kind", "wrong"),
     [(MRANRegressor, w) for w in (*WRONG["both"], *WRONG["MRAN"])]

@@ -206,6 +206,7 @@ def test_an_export_that_is_off_is_found():
     assert compare_body(thing, _Off(thing, 1.0 + 1e-8), Precision(single=True)).passed
 
 
+@pytest.mark.full
 def test_a_damaged_table_is_found(tmp_path):
     compiler = require_program("gcc")
     thing = body("pad")

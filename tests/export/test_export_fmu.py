@@ -42,6 +42,7 @@ def files(tmp_path_factory):
     return folder
 
 
+@pytest.mark.full
 @pytest.mark.grid
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", NAMES)

@@ -25,6 +25,7 @@ def exported(tmp_path_factory):
     return export_lib(body("relaxation"), folder, compiler="gcc", check=False)
 
 
+@pytest.mark.full
 def test_every_function_of_every_wrapper_is_in_the_library(exported):
     library = ctypes.CDLL(str(exported.library))
     for file in exported.wrappers:

@@ -69,6 +69,7 @@ def middle(thing, scale=1.0):
     return np.array([0.2 * low[0], 0.1 * high[1], high[2] - scale * 0.8 * (high[2] - low[2])])
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", ["organ", "creep"])
 def test_a_held_press_relaxes_as_its_series_says(name, version, files):
@@ -173,6 +174,7 @@ def ctypes_array(count):
     return (ctypes.c_double * count)()
 
 
+@pytest.mark.full
 def test_more_states_than_solvers_can_take_are_left_out(tmp_path):
     thing = BODIES["relaxation"]()
     for count, exchange in ((999, True), (1001, False)):

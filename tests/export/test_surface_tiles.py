@@ -47,6 +47,7 @@ def unrounded() -> TouchedSurface:
     return dataclasses.replace(egg(), coefficients=egg().coefficients + noise)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("surface", [egg, cap, unrounded])
 def test_all_that_is_felt_is_the_same_and_nothing_else_is_felt(surface):
     true = surface()
@@ -106,6 +107,7 @@ int main(void) {
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("single", [False, True], ids=["double", "float"])
 def test_c_has_the_numbers_of_python_bit_for_bit(single, tmp_path):
     compiler = require_program("gcc")
@@ -220,6 +222,7 @@ def sealed(block: bytes) -> bytes:
     return block[:16] + size + struct.pack("<Q", fnv(block[64:])) + block[32:]
 
 
+@pytest.mark.full
 def test_damaged_digits_are_refused_or_harmless(reader):
     small = TouchedSurface.of(*_tetrahedron(), radius=0.006, reach=0.0105, inner=0.003, spacing=0.002)
     thing = with_surface(body("closed"), small)

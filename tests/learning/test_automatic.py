@@ -77,6 +77,7 @@ def test_a_tighter_target_takes_finer_steps_and_is_reached():
     assert all(f.reached == (f.error <= t) for f, t in zip(found, TARGETS, strict=True))
 
 
+@pytest.mark.full
 def test_a_reached_target_and_a_missed_one_are_told():
     X, Y = bump(40)
     inputs, outputs = ranges_of(X), named(Y)

@@ -107,6 +107,7 @@ def test_noise_is_not_learnt():
     assert np.sqrt((found.network.predict(X_test) ** 2).mean()) < 0.6
 
 
+@pytest.mark.full
 def test_constant_outputs():
     X, Y, X_test, _ = samples(ridges, count=30)
     Y[:, 2] = 0.1

@@ -70,6 +70,7 @@ def test_copies_that_tell_a_noise_are_all_learnt_from(step):
     assert problem_without_copies(samples)[0] is samples
 
 
+@pytest.mark.full
 def test_a_note_names_rows_of_the_whole_table():
     """One place whose three rows are wrong alike is told of by its row in the table that was given."""
     y = wave(X := triples(box(120, 2), 1e-6))

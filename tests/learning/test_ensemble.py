@@ -93,6 +93,7 @@ def test_what_a_mean_misses_of_a_solve_left_out_is_the_mean_of_what_its_networks
     assert found.error <= 1.1 * min(alone(search, one) for one in networks)
 
 
+@pytest.mark.full
 def test_unseen_answers_are_nearer_than_the_networks_on_average(mean):
     """The error of a mean is below the mean of the squared errors, by what its networks differ (Krogh & Vedelsby)."""
     found = mean(4)

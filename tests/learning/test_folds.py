@@ -118,6 +118,7 @@ def test_rows_that_are_nearly_copies_are_at_one_place(inputs):
     assert len(np.unique(places)) > 2090
 
 
+@pytest.mark.full
 def test_errors_are_as_large_as_at_places_never_seen():
     X, rng = places(40), np.random.default_rng(0)
     problem = problem_of(X, *wave(X), groups=np.arange(40))

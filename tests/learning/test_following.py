@@ -88,6 +88,7 @@ def test_noise_is_learnt_by_place():
     assert sum(e.outlier for e in events) < 15
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("settings", [Following(), default()], ids=["following", "refined"])
 @pytest.mark.parametrize("declared", [True, False])
 def test_an_early_spike_is_survived(settings, declared):
@@ -125,6 +126,7 @@ def streams(rng, t, n):
     return kinds[(t // 100) % len(kinds)]()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("n", [1, 6])
 def test_no_stream_of_numbers_stops_the_loop(n):
     rng = np.random.default_rng(0)

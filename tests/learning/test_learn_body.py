@@ -116,6 +116,7 @@ def touches() -> Dataset:
     return assemble(problem.ranges, problem.layout, X, columns, origin, schema=problem.schema)
 
 
+@pytest.mark.full
 def test_ranges_and_symmetry_are_those_of_the_whole():
     """Solved is a quadrant; the surrogate's inputs are all of it."""
     found = PressedSolves.of(touches())

@@ -116,6 +116,7 @@ def test_unknown_stiffnesses_and_solves_without_contact_leave_no_rows(surface):
     assert len(rows.targets) == 9 * 4 + 8 * 6
 
 
+@pytest.mark.full
 def test_the_leave_one_solve_out_error_is_that_of_fits_without_each_solve(surface):
     X, U, F, K = touches(8)
     samples = EnergySamples.of(solves(X, U, F, K), contact(surface))
@@ -137,6 +138,7 @@ def test_the_leave_one_solve_out_error_is_that_of_fits_without_each_solve(surfac
     assert found == pytest.approx(total / rows.total, rel=1e-6)
 
 
+@pytest.mark.full
 def test_the_posterior_covers_nine_tenths_of_what_is_missed_when_left_out(surface):
     """With covariances of fits without each fold, and the share that so few solves ask for (Vovk et al. 2005)."""
     X, U, F, K = touches(24)
@@ -168,6 +170,7 @@ def test_the_posterior_covers_nine_tenths_of_what_is_missed_when_left_out(surfac
     assert held == np.ceil(0.9 * 25 / 24 * 23)  # the quantile lies between this one and the next
 
 
+@pytest.mark.full
 def test_no_unit_is_narrower_than_what_a_probe_can_feel(surface):
     X, U, F, K = touches(12)
     samples = EnergySamples.of(solves(X, U, F, K), contact(surface))
@@ -226,6 +229,7 @@ def test_a_smooth_body_is_learnt_from_a_few_solves(learnt):
     assert np.quantile(bend, 0.95) < 0.04
 
 
+@pytest.mark.full
 def test_what_is_learnt_has_the_symmetry_exactly(learnt):
     X = touches(20, seed=2)[0]
     s = learnt[0]

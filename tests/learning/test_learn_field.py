@@ -223,6 +223,7 @@ def test_a_dimple_that_differs_from_place_to_place_is_learnt(face, components):
     assert missed.mean() < 0.1 * without.mean()
 
 
+@pytest.mark.full
 def test_a_dimple_that_is_the_same_everywhere_does_not_vary(face):
     points, triangles, surface = face
     X, column = columns(12)
@@ -387,6 +388,7 @@ def test_what_cannot_be_learnt_is_refused(face):
         learn_field(X + np.array([0, 0, 0.02]), values, **known)
 
 
+@pytest.mark.full
 def test_a_pressed_block_is_seen_within_stated_errors():
     data = solved("block").ok
     top = np.abs(data.rest[data.triangles][:, :, 2] - 0.03).max(axis=1) < 1e-9

@@ -69,6 +69,7 @@ def test_images_of_a_solve_get_images_of_its_force(square):
         np.testing.assert_allclose(S.force(turned), S.force(X) @ M.T, atol=1e-9 * np.abs(S.force(X)).max())
 
 
+@pytest.mark.full
 def test_the_samples_of_a_known_law_are_its_polynomial():
     """Solves of U = ½ ‖S d‖² exp P have ℓ + P = P with all derivatives, whatever S and P are."""
     rng = np.random.default_rng(0)
@@ -143,6 +144,7 @@ def test_monomials_and_their_derivatives():
     assert value.shape == (5, 35)
 
 
+@pytest.mark.full
 def test_without_symmetry_and_without_derivatives_by_place_it_still_learns():
     energy, _ = learnt(24, derivatives=False, symmetry=(), stiffening=2, degree=1, units_max=0)
     test = drawn(100, seed=9)

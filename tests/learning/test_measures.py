@@ -50,6 +50,7 @@ def test_thresholds_are_the_same_in_any_unit(unit):
     assert given.noise == pytest.approx(wanted.noise, rel=1e-6)
 
 
+@pytest.mark.full
 def test_lists_are_samples_too():
     assert automatic(X.tolist(), Y.tolist(), target=0.3, passes=1) == automatic(X, Y, target=0.3, passes=1)
 

@@ -224,6 +224,7 @@ def test_many_outputs_are_learnt_in_their_modes():
     assert np.sqrt((error**2).mean()) < 1e-4 * truth(grid).std()
 
 
+@pytest.mark.full
 def test_reservoir_is_a_uniform_sample():
     """Each of 200 samples is kept with probability R/t: over 500 seeds the counts are binomial."""
     R, t, runs = 20, 200, 500

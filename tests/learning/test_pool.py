@@ -49,6 +49,7 @@ def program(text, *arguments, stdin=False):
     )
 
 
+@pytest.mark.full
 def test_results_are_in_order_and_of_other_processes():
     found = Pool(2).map(_place, range(6))
     assert [number for number, _ in found] == list(range(6))

@@ -33,6 +33,7 @@ def test_refined_network_is_the_smallest_that_meets_the_target():
     assert np.abs(network.predict(unseen) - answers).max() < 2e-5
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("radial", RADIALS)
 def test_refined_networks_of_every_radial_function_are_frozen_as_they_are(radial):
     X, Y = stiffening(26)

@@ -35,6 +35,7 @@ def test_it_has_the_layers_of_the_contract():
     assert "".join(f"    {layer.replace('palpate.', '')}\n" for layer in layers) in PAGE
 
 
+@pytest.mark.full
 def test_counts_are_those_of_the_sources(counts):
     """Packages to 3 % and a hundred lines, so that not each small change renews the page; files to 10 % and ten."""
     stated = list(counts.counted(PAGE))

@@ -46,6 +46,7 @@ def test_a_stub_lists_what_its_package_offers(stub):
         _ = package.no_such_name
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("code", "absent"),
     [
@@ -81,6 +82,7 @@ def test_few_files_are_short():
     assert len(short) <= SHARE_OF_SHORT_FILES * len(ideas), f"join some of them: {short}"
 
 
+@pytest.mark.full
 def test_functions_stay_short():
     long = {
         f"{file}:{node.name}": lines
@@ -151,6 +153,7 @@ def test_no_circle_of_imports():
     list(graphlib.TopologicalSorter(graph).static_order())  # raises CycleError, which names the circle
 
 
+@pytest.mark.full
 def test_no_module_of_palpate_is_imported_by_name():
     """The import contract in pyproject.toml sees no import that is a string.
 

@@ -113,6 +113,7 @@ def code(text: str) -> str:
     return "\n".join([*inline, *blocks, *fenced])
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_every_command_named_exists(page: Path):
     known = commands()

@@ -187,6 +187,7 @@ SHARED = st.sampled_from(["spring", "spring.surface", "fields.other", "network",
 ANYTHING = JSON | SHARED.map(lambda place: {"same as": place})
 
 
+@pytest.mark.full
 @settings(deadline=None)
 @given(
     place=st.sampled_from([p for p in places(DESCRIBED) if p and "meta" not in p]),

@@ -195,6 +195,7 @@ def places(value, path=()):
         yield from places(inner, (*path, key))
 
 
+@pytest.mark.full
 @FUZZ
 @given(path_to=st.sampled_from([p for p in places(CONTENT) if p]), value=JSON, drop=st.booleans())
 def test_any_part_of_the_description_replaced(tmp_path, path_to, value, drop):
@@ -210,6 +211,7 @@ def test_any_part_of_the_description_replaced(tmp_path, path_to, value, drop):
 NUMBERS = st.floats() | st.sampled_from([0.0, -0.0, 1e-320, 1e99, 1e101, 1e200, -1e308])
 
 
+@pytest.mark.full
 @FUZZ
 @given(name=st.sampled_from(sorted(TENSORS)), data=st.data())
 def test_any_number_of_an_array_replaced(tmp_path, name, data):
@@ -219,6 +221,7 @@ def test_any_number_of_an_array_replaced(tmp_path, name, data):
     survives(forge(tmp_path / "f.palpate", CONTENT, TENSORS | {name: array}))
 
 
+@pytest.mark.full
 @FUZZ
 @given(
     name=st.sampled_from(sorted(TENSORS)),

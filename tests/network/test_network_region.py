@@ -138,6 +138,7 @@ def test_a_query_costs_less_than_the_distances_by_numpy():
     assert least["region"] < least["NumPy"]  # 2 of 15 µs
 
 
+@pytest.mark.full
 def test_a_region_of_very_many_inputs_holds_them_all():
     X = np.random.default_rng(0).uniform(-1, 1, (30_000, 2))
     X[7] = 3.0, 3.0  # alone, and perhaps not among those of which points are chosen

@@ -66,6 +66,7 @@ def by_complex_step(function, z):
     return np.stack(columns, axis=-1)
 
 
+@pytest.mark.grid
 @every_form
 @every_radial
 @pytest.mark.parametrize("widths", ["log", "plain"])
@@ -220,6 +221,7 @@ def known_of(state, count, seed=8):
         yield Observation(x, y, float(rng.uniform(0.5, 3)), slopes, s, curvatures, c)
 
 
+@pytest.mark.grid
 @every_form
 @every_radial
 @pytest.mark.parametrize("update", ["full", "decoupled"])

@@ -239,6 +239,7 @@ def refined_line():
     return x, y, refine(x, y, np.column_stack([np.linspace(-1, 1, 3), np.full(3, np.log(0.8))]), LINE)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("update", ["full", "decoupled", "winner", "shared"])
 def test_learning_goes_on_from_the_posterior_without_harm(update):
     x, _, found = refined_line()

@@ -100,6 +100,7 @@ def test_contribution_is_judged_output_by_output():
     np.testing.assert_array_equal(contributions(state, np.array([0.0]), settings), [1.0, 1.0])
 
 
+@pytest.mark.full
 @given(st.lists(st.floats(-1, 1), min_size=1, max_size=4))
 def test_edge_factor_is_one_in_the_middle_and_never_below_its_floor(x):
     factor = edge_factor(np.array(x), 0.01)
@@ -144,6 +145,7 @@ def test_no_update_raises_the_windows_error_beyond_what_is_allowed(seed):
     assert error(after) <= error(state) * (1 + 1e-12)
 
 
+@pytest.mark.full
 def test_learning_a_smooth_map_reaches_its_accuracy_and_never_regresses():
     X, Y = stiffening(200)
     learned = learn(X[::2], Y[::2], INPUT, OUTPUTS, heldout=(X[1::2], Y[1::2]), seed=1)

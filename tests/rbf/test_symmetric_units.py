@@ -52,6 +52,7 @@ def test_written_out_it_is_an_ordinary_network(kind):
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.grid
 @every_form
 def test_slopes_and_curvatures_equal_complex_step(kind):
     r, X, theta = some_units(kind)

@@ -30,6 +30,7 @@ def relaxing():
     return FaultInjector(touchable(pressed.surrogate(factor=5.0, memory=Relaxation(((0.4, 0.1),)))), seed=3)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("kind", list(FAULTS))
 def test_a_fault_takes_the_force_is_recorded_and_heals(beam, kind):
     outcome = beam.inject(kind)

@@ -28,6 +28,7 @@ BODIES = {
 }
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("make", BODIES.values(), ids=BODIES)
 def test_a_tick_allocates_nothing(make):
     model = touchable(make())

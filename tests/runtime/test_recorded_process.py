@@ -35,6 +35,7 @@ def assert_same(path, model):
     return trace
 
 
+@pytest.mark.full
 def test_a_run_is_recorded_from_its_first_tick_and_a_button_records_its_midst(spring_file, tmp_path):
     whole, part = tmp_path / "whole.trace", tmp_path / "part.trace"
     with LoopProcess(spring_file, device="simulated:frequency=3,delay=0.002", record=whole) as loop:

@@ -223,6 +223,7 @@ SELF = {
 }
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", list(SELF))
 def test_a_body_that_takes_its_own_place_is_felt_as_if_nothing_happened(name):
     """Also what it remembers goes on: it is pressed, swapped while pressed, let go, pressed again and let go."""

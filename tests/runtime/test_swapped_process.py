@@ -32,6 +32,7 @@ def other_faults(state):
     return state.faults - state.fault_counts[Fault.CLOCK_JUMP]
 
 
+@pytest.mark.full
 def test_surrogates_take_over_while_the_loop_ticks_and_are_replayed(files, tmp_path):
     whole, part = tmp_path / "whole.trace", tmp_path / "part.trace"
     with LoopProcess(files[1.0], device="simulated:frequency=3", record=whole) as loop:
@@ -102,6 +103,7 @@ def test_a_replay_takes_no_other_surrogate(files, tmp_path):
         loop.swap(files[1.5])
 
 
+@pytest.mark.full
 def test_a_loop_that_has_died_takes_nothing_and_stops_in_good_order(files):
     with LoopProcess(files[1.0], device="simulated:frequency=3") as loop:
         os.kill(loop.pid, signal.SIGKILL)

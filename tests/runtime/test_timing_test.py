@@ -39,6 +39,7 @@ def punctual():
     return replace(run(Clock()), work_p50=30e-6, work_p99=40e-6)
 
 
+@pytest.mark.full
 def test_a_punctual_machine_is_good(punctual):
     assert punctual.ticks == pytest.approx(1000 * SECONDS, abs=1)
     assert not punctual.faults
@@ -48,6 +49,7 @@ def test_a_punctual_machine_is_good(punctual):
     assert verdict.missed == 0.0
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("late", "every", "grade"),
     [

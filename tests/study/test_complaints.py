@@ -67,6 +67,7 @@ RECORDS = {
 }
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("record", sorted(RECORDS, key=lambda r: r.__name__), ids=lambda r: r.__name__)
 def test_every_mistake_in_a_key_is_a_sentence_of_ours(record):
     for name, field in record.model_fields.items():

@@ -121,6 +121,7 @@ def test_a_file_that_has_changed_is_told(tmp_path: Path):
         picked.body.model_copy(update={"surfaces": tuple(surfaces)}).surface_names()
 
 
+@pytest.mark.full
 def test_a_face_of_a_step_file_is_not_picked_in_part(tmp_path: Path):
     """What faces up cuts a lying cylinder's side; with another face it is no pick of whole faces any more."""
     from netgen.occ import Cylinder, Pnt, X

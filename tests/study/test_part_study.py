@@ -73,6 +73,7 @@ def test_surfaces_are_named_by_plane_direction_and_what_is_left(folder):
     assert found == pytest.approx({"table": 1200, "touched": 1200, "rim": 2 * 20 * (40 + 30)})
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("bounds", "area"),
     [
@@ -327,6 +328,7 @@ def test_a_part_goes_the_whole_way(folder, tmp_path):
         study_of(folder, HEAD + FEW_SOLVES.replace("samples = 6", "sample = 6"))
 
 
+@pytest.mark.full
 def test_a_ring_is_touched_on_itself_and_a_mesh_keeps_its_elements(tmp_path):
     """The hole of a ring is no place to press; elements of a mesh that are no larger than the ball are not halved."""
     from netgen.occ import Cylinder, Pnt, Z

@@ -162,6 +162,7 @@ depths = 2
 """
 
 
+@pytest.mark.full
 def test_a_family_of_bodies_has_its_numbers_as_inputs(tmp_path):
     study = read_study(study_file(tmp_path, FAMILY))
     assert read_study(study_file(tmp_path, to_toml(study))) == study

@@ -69,6 +69,7 @@ def test_first_touch_begins_with_no_force_and_grows_as_the_law_does(law):
     assert np.isfinite(S.stiffness(X)).all()
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("surface", [plane, ball], ids=["plane", "ball"])
 @pytest.mark.parametrize("more", [{}, FAMILY], ids=["3", "5"])
 @pytest.mark.parametrize("points", [inside_points, around_points], ids=["inside", "around"])
@@ -85,6 +86,7 @@ def test_force_and_stiffness_are_derivatives_of_the_energy(surface, more, points
     np.testing.assert_array_equal(K, K.transpose(0, 2, 1))
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("law", LAWS, ids=[law.name for law in LAWS])
 @pytest.mark.parametrize("surface", [plane, ball], ids=["plane", "ball"])
 def test_inside_it_is_what_the_formulas_say_in_plain_numpy(law, surface):
@@ -144,6 +146,7 @@ def stroke(shape, panels: int = 6000):
     return place, along * w[:, None]
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("surface", [plane, ball], ids=["plane", "ball"])
 @pytest.mark.parametrize("name", loops())
 def test_no_closed_path_yields_work(surface, name):

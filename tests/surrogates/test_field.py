@@ -176,6 +176,7 @@ def test_single_precision_costs_seven_digits_and_no_more():
         np.testing.assert_array_equal(double.coefficients, F.coefficients(x[None])[0])
 
 
+@pytest.mark.full
 def test_an_input_that_is_not_finite_gives_no_number():
     ev = field(local_mode=False).evaluator()
     assert not ev([0.0, np.nan, 0.005])

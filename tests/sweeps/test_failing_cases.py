@@ -19,6 +19,7 @@ from palpate.sweeps import local_cluster, sweep
 from palpate.sweeps.runner import connect
 
 
+@pytest.mark.full
 def test_crashing_cases_cost_only_themselves(cluster, tmp_path):
     """Four of 96 take their process down, by a signal or an exit, among others that raise."""
     points = np.arange(96.0) / 10
@@ -42,6 +43,7 @@ def test_crashing_cases_cost_only_themselves(cluster, tmp_path):
     assert "case.py" not in raised
 
 
+@pytest.mark.full
 def test_a_case_that_never_ends_costs_its_limit_once(cluster, tmp_path):
     spring = Spring(hangs=(4.0,), log=str(tmp_path))
     data = sweep(spring, points=np.arange(8.0), cluster=cluster, case_limit=2.0)
@@ -95,6 +97,7 @@ class Unopenable(Ground):
         os.abort()
 
 
+@pytest.mark.full
 def test_a_model_that_cannot_be_opened_is_tried_twice_by_each_worker(cluster, tmp_path):
     with pytest.raises(SolverError, match="32 of 32") as caught:
         sweep(Unopenable(log=str(tmp_path)), samples=32, cluster=cluster)
@@ -128,6 +131,7 @@ def test_a_killed_worker_changes_no_bit_and_leaves_nothing(cluster):
     assert not alive
 
 
+@pytest.mark.full
 def test_sigterm_keeps_what_is_solved(cluster, tmp_path):
     def terminate(done, total):
         if done:

@@ -32,6 +32,7 @@ def interrupt_after(count):
     return interrupt
 
 
+@pytest.mark.full
 def test_every_answer_is_where_it_belongs(cluster):
     data = sweep(Ground(), samples=32, seed=2, cluster=cluster)
     assert data.converged.all()
@@ -92,6 +93,7 @@ def test_an_interruption_changes_no_bit(cluster, tmp_path):
     assert Dataset.open(tmp_path / "a.zarr").hash == data.hash
 
 
+@pytest.mark.full
 def test_a_chain_of_which_only_a_part_is_on_disk_is_solved_again(cluster, tmp_path):
     whole = sweep(Ground(), samples=16, cluster=cluster)
     ledger = Ledger(tmp_path / "a.zarr", whole.provenance["config_hash"])
@@ -109,6 +111,7 @@ def test_a_chain_of_which_only_a_part_is_on_disk_is_solved_again(cluster, tmp_pa
     assert data.hash == whole.hash
 
 
+@pytest.mark.full
 def test_parts_of_another_mesh_are_not_taken_up(cluster, tmp_path):
     whole = sweep(Ground(), samples=8, cluster=cluster)
     moved = Dataset(whole.data.assign_coords(rest=whole.data["rest"] + 1e-6))

@@ -32,6 +32,7 @@ def test_a_sweep_is_the_solves_one_by_one(cluster):
     assert data.provenance["problem"] == json.loads(json.dumps(problem.describe()))
 
 
+@pytest.mark.full
 def test_the_founding_sweep(cluster):
     beam = preset("beam-nylon")
     data = sweep(beam.body, beam.loads, samples=beam.samples, design=beam.design, cluster=cluster)
@@ -45,6 +46,7 @@ def test_the_founding_sweep(cluster):
     np.testing.assert_allclose(slope, tip[1:-1], atol=5e-6)  # h² w'''/6
 
 
+@pytest.mark.full
 def test_the_number_of_workers_changes_no_bit(cluster):
     two = sweep(BODY, TipLoad(0, 5), samples=40, cluster=cluster)
     one = sweep(BODY, TipLoad(0, 5), samples=40, workers=1)
@@ -169,6 +171,7 @@ def test_a_finished_sweep_is_read_not_solved_again(cluster, tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.zarr", "log"]
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("change", [{"samples": 9}, {"seed": 1}, {"body": Spring(fails=(1.0,))}])
 def test_another_sweep_at_the_same_path_is_refused(cluster, tmp_path, change):
     arguments = {"body": Spring(), "samples": 8, "cluster": cluster, "path": tmp_path / "a.zarr"}
@@ -178,6 +181,7 @@ def test_another_sweep_at_the_same_path_is_refused(cluster, tmp_path, change):
     assert Dataset.open(tmp_path / "a.zarr").hash == first.hash
 
 
+@pytest.mark.full
 def test_a_finished_sweep_grows_by_what_is_missing(cluster, tmp_path):
     """Sobol's first points are those of a smaller design: the larger sweep is the same as one made at once."""
     (tmp_path / "log").mkdir()
@@ -199,6 +203,7 @@ def test_a_finished_sweep_grows_by_what_is_missing(cluster, tmp_path):
         sweep(spring, samples=32, seed=1, cluster=cluster, path=path)
 
 
+@pytest.mark.full
 def test_an_interrupted_sweep_goes_on_where_it_stopped(cluster, tmp_path):
     (tmp_path / "log").mkdir()
     spring = Spring(log=str(tmp_path / "log"), seconds=0.01)
@@ -302,6 +307,7 @@ def test_a_log_gets_a_line_now_and_then(monkeypatch, capsys):
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.full
 def test_a_damaged_part_is_solved_again(cluster, tmp_path):
     arguments = {"body": Spring(), "samples": 64, "cluster": cluster, "path": tmp_path / "a.zarr"}
 

@@ -39,6 +39,7 @@ def pruned():
     return run("mran", watch=recorder), recorder
 
 
+@pytest.mark.full
 def test_watching_changes_nothing(pruned):
     watched, _ = pruned
     alone = run("mran")
@@ -67,6 +68,7 @@ def test_frames_tell_every_unit_that_appears_and_vanishes(pruned):
     assert last.observation == recorder.total == 480
 
 
+@pytest.mark.full
 def test_of_one_input_the_frames_hold_the_networks_answer():
     recorder = GrowthRecorder()
     learned = run("default", inputs=PLANE[:1], watch=recorder)
@@ -104,6 +106,7 @@ def page(chromium: str, pruned, tmp_path_factory) -> Iterator:
         running.close()
 
 
+@pytest.mark.full
 def test_the_page_plays_the_frames(page, pruned):
     _, recorder = pruned
     assert page.locator("h1").inner_text() == f"How the network of {NAME} grew"
@@ -119,6 +122,7 @@ def test_the_page_plays_the_frames(page, pruned):
     page.wait_for_function("document.getElementById('time').value > 3", timeout=20_000)
 
 
+@pytest.mark.full
 def test_the_page_is_one_file(pruned):
     text = growth_html(pruned[1], NAME)
     assert not re.search(r"https?:|src=|@import", text)

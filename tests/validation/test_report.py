@@ -103,6 +103,7 @@ def browser(chromium: str) -> Iterator[Browser]:
         running.close()
 
 
+@pytest.mark.full
 def test_nothing_comes_from_elsewhere(report: Path, read: Reader) -> None:
     page = re.sub(r'"data:image/png;base64,[^"]*"', "", report.read_text(encoding="utf-8"))
     assert not re.search(r"https?:|//[a-z]|@import|url\((?!#)", page)
@@ -179,6 +180,7 @@ def test_the_same_data_give_the_same_page(tmp_path: Path) -> None:
     assert pages[0] == pages[1]
 
 
+@pytest.mark.full
 def test_a_network_that_answers_nonsense_can_be_reported(tmp_path: Path) -> None:
     """Not-a-number at every node: the page comes, and says that a limit was missed."""
     touch, data = tip_model(), tip_data()
@@ -214,6 +216,7 @@ def visit(browser: Browser, report: Path, width: int, scheme: Any) -> tuple[Page
     return page, complaints
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 1200])
 def test_a_browser_shows_it_without_complaint(

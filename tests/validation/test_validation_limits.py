@@ -74,6 +74,7 @@ def test_every_limit_has_one_criterion_and_the_other_way_round() -> None:
     assert [f.name for f in dataclasses.fields(Limits)] == [c.key for c in CRITERIA]
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("key", [c.key for c in ONE_SIDED])
 def test_a_limit_fails_just_below_what_was_measured(key: str) -> None:
     measured = judged(**{key: 1e6}).checks[0].measured
@@ -86,6 +87,7 @@ def test_a_limit_fails_just_below_what_was_measured(key: str) -> None:
         missed.raise_if_failed()
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("key", [c.key for c in ONE_SIDED if c.good is not None])
 def test_grades(key: str) -> None:
     """Good is never asked beyond a default limit."""

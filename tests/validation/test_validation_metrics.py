@@ -124,6 +124,7 @@ def test_a_turned_force_is_off_by_that_angle(degrees: float) -> None:
     assert force.median == pytest.approx(2 * math.sin(math.radians(degrees) / 2), rel=1e-6)
 
 
+@pytest.mark.full
 def test_no_force_at_all_is_as_wrong_as_the_opposite_one() -> None:
     assert turned(np.zeros((3, 3))).force.direction_p95 == pytest.approx(180.0)
 

@@ -77,6 +77,7 @@ def test_a_miss_is_an_error_with_the_worst_place() -> None:
     assert "in history 1 at w =" in str(found.failures[1])
 
 
+@pytest.mark.full
 def test_energy_that_comes_back_is_a_miss() -> None:
     """Elements are checked when made; a body that was tampered with is not believed."""
     made = rod()

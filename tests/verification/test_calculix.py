@@ -78,6 +78,7 @@ def test_a_pushed_patch_resists_as_in_calculix(
     assert_same(solution, answer, np.eye(3)[[0, 2]], fixed, within)
 
 
+@pytest.mark.full
 def test_a_bar_beyond_yield_resists_as_in_calculix(ccx, tmp_path):
     """Between two bonded ends, stretched by one per cent in four steps and let back by half: it yields both ways."""
     law = Plastic(LinearElastic(110e9, 0.35), LinearHardening(125e6, 2e9))

@@ -85,6 +85,7 @@ def test_the_work_of_pressing_and_sliding_is_the_change_of_energy(pressed, slid)
         assert work(found) == pytest.approx(energies[-1] - energies[0], abs=1e-4 * energies[-1])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("share", [0.25, 1.0])
 def test_the_force_is_minus_the_gradient_of_the_energy_while_sliding(solver, slid, share):
     here = slid[round(share * (len(slid) - 1))]

@@ -82,6 +82,7 @@ def limit(values):
     return values[-1] + second / (first / second - 1)
 
 
+@pytest.mark.full
 def test_displacements_alone_lock_and_the_mixed_form_does_not():
     """Eight elements along a side: first order reaches 28 %, second order 93 %, the mixed form 98 %."""
     mixed, stiff = (raised(GEL, 8, LINE, MIDDLE, form) / GEL_RISE for form in ("mixed", "displacement"))
@@ -99,6 +100,7 @@ def test_small_strain_meets_the_published_rise():
     assert limit(values) == pytest.approx(GEL_RISE, rel=2e-3)
 
 
+@pytest.mark.full
 def test_finite_strain_meets_the_published_rise():
     values = [raised(RUBBER, n, SHEAR, CORNER) for n in (2, 4, 8)]
     assert limit(values) == pytest.approx(RUBBER_RISE, rel=5e-3)

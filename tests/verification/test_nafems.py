@@ -117,6 +117,7 @@ def plate(element, fine):
     return body.problem(SurfaceTraction("top", "z", (-2e6, 0.0))).solve(-1e6, fields=True)
 
 
+@pytest.mark.full
 def test_le1_elliptic_membrane():
     """Within 1 %, 0.05 % measured on the free face; the other components vanish as on any free edge."""
     found = membrane(element=0.3, fine=0.025)

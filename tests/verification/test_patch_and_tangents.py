@@ -75,6 +75,7 @@ def stretch(x, y, z):
     return tuple(row[0] * x + row[1] * y + row[2] * z for row in MATRIX.tolist())
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("law", LAWS)
 def test_the_patch_test_is_exact(law, form):
@@ -134,6 +135,7 @@ def shaken_state(field, seed=2):
     return z
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("law", LAWS)
 def test_residual_and_tangent_are_derivatives(law, form):
@@ -159,6 +161,7 @@ def test_tangents_of_materials_with_a_history_are_derivatives(law, form):
     assert second < 1e-9
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("form", FORMS)
 def test_the_tangent_with_contact_is_a_derivative(form):
     probe = SphereProbe(radius=0.01, depth=(0.0, 0.005), over=((0.014, 0.014), (0.016, 0.016)))

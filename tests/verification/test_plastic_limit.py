@@ -93,6 +93,7 @@ def test_the_pressure_follows_the_front_up_to_the_limit():
     assert math.log2((1 - coarse[-1]) / (1 - fine[-1])) == pytest.approx(2, abs=0.3)
 
 
+@pytest.mark.full
 def test_the_limit_of_a_compressible_metal_is_the_same():
     fronts = (1.0, 1.6, 2.6, 6.0, 12.0)
     last = [pressed(poisson, fronts, "mixed", 2)[-1] for poisson in (0.3, 0.4999)]

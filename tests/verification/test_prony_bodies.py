@@ -44,6 +44,7 @@ def relaxation(t):
 PULL = PrescribedDisplacement("top", "z", (-SIDE, SIDE), sliding=True)
 
 
+@pytest.mark.full
 def test_a_stretched_bar_relaxes_as_the_series_at_any_strain():
     """Incompressible neo-Hookean bar, stretched by half at once and held: exact in steps of any length."""
     law = NeoHookean(YOUNG, 0.5, form="isochoric")

@@ -108,6 +108,7 @@ def test_a_sphere_inflated_by_a_third_is_that_of_the_closed_form():
     assert math.log2(coarse / fine) > 3
 
 
+@pytest.mark.full
 def test_the_incompressible_limit_is_approached_as_the_compressibility():
     """What a finite bulk modulus K adds to the growth falls as 1/K, and no locking comes instead."""
     limit = widened(0.5, 0)

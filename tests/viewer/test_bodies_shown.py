@@ -95,6 +95,7 @@ def write_tetrahedron(path: Path, lift: float) -> None:
     meshio.write(path, meshio.Mesh(points, [("tetra", [[0, 1, 2, 3]])], {"displacement": u, "heat": u[:, 2]}))
 
 
+@pytest.mark.full
 def test_files_of_other_programs_are_shown(tmp_path: Path):
     for i in range(2):
         write_tetrahedron(tmp_path / f"{i}.vtu", 0.001 * i)

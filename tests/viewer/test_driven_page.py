@@ -58,6 +58,7 @@ def test_a_page_too_busy_to_draw_keeps_its_force_and_one_that_hangs_says_why_not
     page.mouse.up()
 
 
+@pytest.mark.full
 def test_a_gamepad_pulls_and_rumbles_with_the_force(page: Page, rod: Surrogate, viewer: Viewer):
     assert "No" in page.inner_text("#gamepad")
     page.evaluate(PAD)

@@ -117,6 +117,7 @@ def test_the_page_answers_as_palpate_does(opened: tuple[Page, list[str]], presse
     assert_no(complaints)
 
 
+@pytest.mark.full
 def test_the_page_is_pressed_with_the_mouse(opened: tuple[Page, list[str]]):
     page, complaints = opened
     press(page)
@@ -152,6 +153,7 @@ def test_a_page_is_refused_where_its_shape_has_no_c_source(rod: Surrogate, tmp_p
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.full
 def test_a_notebook_shows_the_page(pressed: Surrogate):
     bare = replace(pressed, meta={"name": "<b>body</b>"})
     shown = bare._repr_html_()
@@ -165,6 +167,7 @@ def test_a_notebook_shows_the_page(pressed: Surrogate):
     assert "<!--" not in hostile.partition("<body>")[2].replace("palpate-card", "")
 
 
+@pytest.mark.full
 def test_a_body_that_was_loaded_shows_itself_without_the_viewer_being_imported(
     pressed: Surrogate, tmp_path: Path
 ):
@@ -182,6 +185,7 @@ print(body._repr_html_()[:15])
     assert done.stdout.strip() == "<iframe srcdoc="
 
 
+@pytest.mark.full
 def test_the_surface_and_its_fields_are_those_of_the_body(
     opened_yielding: tuple[Page, list[str]], yielding: Surrogate
 ):
@@ -205,6 +209,7 @@ def test_the_surface_and_its_fields_are_those_of_the_body(
         assert set(np.array(field["touched"], dtype=int)) == set(np.flatnonzero(own.touched[nodes]))
 
 
+@pytest.mark.full
 def test_another_field_colours_the_body(opened_yielding: tuple[Page, list[str]]):
     page, complaints = opened_yielding
     page.get_by_role("button", name="largest stretch").click()
@@ -216,6 +221,7 @@ def test_another_field_colours_the_body(opened_yielding: tuple[Page, list[str]])
     assert_no(complaints)
 
 
+@pytest.mark.full
 def test_an_indentation_stays_on_the_page(opened_yielding: tuple[Page, list[str]], yielding: Surrogate):
     page, complaints = opened_yielding
     press(page)

@@ -60,6 +60,7 @@ def test_a_websocket_without_origin_and_a_second_host_are_refused():
     assert refusal("http", two)
 
 
+@pytest.mark.full
 def test_the_running_server_answers_403(viewer: Viewer):
     with pytest.raises(InvalidStatus) as caught, socket_of(viewer, origin="http://evil.example"):
         pass
@@ -93,6 +94,7 @@ def test_other_machines_can_not_be_served(host: str):
         listen(0, host)
 
 
+@pytest.mark.full
 def test_nothing_is_served_without_the_token(viewer: Viewer):
     other, almost = Token().secret, next(iter(viewer.cookies.values()))[:-1]
     name = next(iter(viewer.cookies))

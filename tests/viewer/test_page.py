@@ -38,6 +38,7 @@ def test_mouse_pulls_and_the_force_is_the_networks(page: Page, keep, rod: Surrog
     assert vector(released["data"], "contact") == pytest.approx(0.0, abs=1e-4 * touchable(rod).reach)
 
 
+@pytest.mark.full
 def test_pulling_beyond_the_trained_range_is_flagged(page: Page, keep, rod: Surrogate):
     drag(page, -40, 250)
     shown = settled(page, "outside")
@@ -48,6 +49,7 @@ def test_pulling_beyond_the_trained_range_is_flagged(page: Page, keep, rod: Surr
     assert let_go(page)["flags"][0] == "free"
 
 
+@pytest.mark.full
 def test_arrow_keys_pull_and_escape_lets_go(page: Page, rod: Surrogate):
     page.focus("#view")
     for _ in range(15):
@@ -62,6 +64,7 @@ def test_arrow_keys_pull_and_escape_lets_go(page: Page, rod: Surrogate):
     let_go(page)
 
 
+@pytest.mark.full
 def test_beside_the_ball_nothing_is_grabbed_and_the_right_button_turns(page: Page):
     x, y = tip(page)
     page.mouse.move(x - 120, y + 90)
@@ -81,6 +84,7 @@ def test_beside_the_ball_nothing_is_grabbed_and_the_right_button_turns(page: Pag
     assert tip(page)[0] == pytest.approx(x, abs=0.5)
 
 
+@pytest.mark.full
 def test_a_hidden_tab_lets_go_and_says_so(page: Page, viewer: Viewer):
     drag(page, -20, 100)
     settled(page, "inside")
@@ -100,6 +104,7 @@ def test_a_hidden_tab_lets_go_and_says_so(page: Page, viewer: Viewer):
     assert shown["flags"][0] == "free"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("width", "height"), [(1060, 640), (390, 780)])
 def test_the_first_view_has_room_for_all_that_the_tip_can_do(page: Page, keep, width: int, height: int):
     before = page.viewport_size
@@ -178,6 +183,7 @@ def test_the_pages_numbers_read_as_the_terminals(page: Page):
         ]
 
 
+@pytest.mark.full
 def test_what_can_be_dragged_has_its_cursor(page: Page):
     shown = "getComputedStyle(document.getElementById('view')).cursor"
     x, y = tip(page)
@@ -191,6 +197,7 @@ def test_what_can_be_dragged_has_its_cursor(page: Page):
     let_go(page)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("width", [320, 390, 800])
 def test_no_button_covers_the_title(page: Page, width: int):
     before = page.viewport_size
@@ -212,6 +219,7 @@ def test_no_button_covers_the_title(page: Page, width: int):
     page.set_viewport_size(before)
 
 
+@pytest.mark.full
 def test_slow_drawing_lowers_the_resolution_until_nothing_moves(page: Page):
     full = page.evaluate("document.getElementById('view').clientWidth")  # one pixel of the display each
     page.evaluate(
@@ -237,6 +245,7 @@ def test_slow_drawing_lowers_the_resolution_until_nothing_moves(page: Page):
     let_go(page)
 
 
+@pytest.mark.full
 def test_messages_mean_the_same_in_typescript(page: Page):
     for before in map(sample, typescript.BINARY):
         read, back = page.evaluate(

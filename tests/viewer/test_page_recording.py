@@ -34,6 +34,7 @@ def told(client, wanted):
                 return news
 
 
+@pytest.mark.full
 def test_a_page_records_a_touch_from_its_midst(recording_viewer, rod, tmp_path):
     with client_of(recording_viewer) as client:
         client.hand(0.0, -0.02)

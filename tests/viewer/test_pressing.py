@@ -79,6 +79,7 @@ def fetched(viewer: Viewer, path: str) -> bytes:
     return get(viewer, path).raise_for_status().content
 
 
+@pytest.mark.full
 def test_force_depth_and_trust_are_the_surrogates_own(pressed_viewer: Viewer, slab: Surrogate):
     place = np.array([0.008, -0.004, pressed.RADIUS - 0.0045])
     with client_of(pressed_viewer) as client:
@@ -120,6 +121,7 @@ def test_coefficients_are_the_fields_and_a_frame_is_small(pressed_viewer: Viewer
     assert len(frame.pack()) < 256 + 4 * (14 * 4 * 3 + 14 * 4 * 1)
 
 
+@pytest.mark.full
 def test_pushed_too_deep_the_body_returns_to_rest_under_the_hand(pressed_viewer: Viewer, slab: Surrogate):
     x, end = np.zeros(3), slab.energy.baseline.surface.inner
     with client_of(pressed_viewer) as client:
@@ -195,6 +197,7 @@ def test_a_surrogate_alone_is_drawn_from_its_distance():
     assert np.abs(drawing.surface.rest).max() < HALF
 
 
+@pytest.mark.full
 def test_a_family_hears_its_slider_and_relaxes(tmp_path):
     with Viewer(family().save(tmp_path / "family.palpate"), port=0) as viewer, client_of(viewer) as client:
         assert [r.name for r in client.hello.parameters] == ["firmness"]

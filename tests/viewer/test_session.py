@@ -51,6 +51,7 @@ def held(client: Client, y: float) -> Frame:
     pytest.fail("the loop never followed the hand")
 
 
+@pytest.mark.full
 def test_without_credit_no_frame(viewer: Viewer):
     with client_of(viewer) as client:
         with pytest.raises(TimeoutError):
@@ -100,6 +101,7 @@ def test_force_and_shape_are_the_models_own(viewer: Viewer, rod: Surrogate):
     assert frame.inside
 
 
+@pytest.mark.full
 def test_two_clients_one_hand(viewer: Viewer, rod: Surrogate):
     with client_of(viewer) as first, client_of(viewer) as second:
         held(first, -0.1)
@@ -125,6 +127,7 @@ def test_a_client_that_vanishes_lets_go(viewer: Viewer):
         assert (frame.hold, frame.grabbed, frame.force) == (Hold.FREE, False, (0.0, 0.0, 0.0))
 
 
+@pytest.mark.full
 def test_without_heartbeats_the_force_is_zero(viewer: Viewer):
     with client_of(viewer) as client:
         assert math.hypot(*held(client, -0.3).force) > 0.5
@@ -135,6 +138,7 @@ def test_without_heartbeats_the_force_is_zero(viewer: Viewer):
         assert frame.force == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.full
 def test_a_hidden_page_lets_go(viewer: Viewer):
     with client_of(viewer) as client:
         held(client, -0.3)
@@ -146,6 +150,7 @@ def test_a_hidden_page_lets_go(viewer: Viewer):
         assert frame.force == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.full
 def test_a_stop_ends_the_force_and_is_told_to_every_page(viewer: Viewer, rod: Surrogate):
     y = -0.3 * touchable(rod).reach
     with client_of(viewer) as client, client_of(viewer) as other:
@@ -163,6 +168,7 @@ def test_a_stop_ends_the_force_and_is_told_to_every_page(viewer: Viewer, rod: Su
         }
 
 
+@pytest.mark.full
 def test_the_reason_of_a_drop_is_told_with_its_age(viewer: Viewer, rod: Surrogate):
     y = -0.3 * touchable(rod).reach
     with client_of(viewer) as client:
@@ -195,6 +201,7 @@ def test_a_body_too_stiff_for_the_device_is_told_with_its_figures(override: bool
     assert session.softening(FeltStiffness(900.0, None, 1000.0)) == session.NOT_SOFTENED
 
 
+@pytest.mark.full
 def test_bytes_that_are_no_message_end_the_conversation(viewer: Viewer):
     for rubbish in (b"\xff\x00", b"\x02", b""):
         with client_of(viewer) as client:

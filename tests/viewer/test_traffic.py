@@ -268,6 +268,7 @@ def test_silent_connections_go_in_the_order_of_their_coming_or_after_their_time(
     assert len(waiting) == 2
 
 
+@pytest.mark.full
 def test_half_open_connections_do_not_close_the_door(viewer: Viewer):
     lines = [socket.create_connection(("127.0.0.1", viewer.port), timeout=5) for _ in range(HALF_OPEN + 40)]
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from bodies import one_sided
 
 from models import linear_network, planar_field, spring_beam, spring_energy
@@ -32,6 +33,7 @@ def test_a_body_that_does_not_mirror_stays_on_its_side(rod: Surrogate):
     assert 0.0 <= high[1] < 1e-4
 
 
+@pytest.mark.full
 def test_loads_of_both_signs_and_several_loads_add_up():
     beam = spring_beam()
     inputs = [Range("across", -2.0, 5.0, "N"), Range("along", -1.0, 1.0, "N")]

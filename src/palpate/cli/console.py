@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from palpate.errors import PalpateError
-from palpate.format import json_data
 from palpate.input_files import plain_text
+from palpate.output_files import json_data
 
 __all__ = ["Console", "advice_in_words"]
 

@@ -8,9 +8,10 @@ from typing import Any
 
 from palpate.dataset import Dataset
 from palpate.errors import AccuracyError
-from palpate.format import count, criterion_figure, json_data
+from palpate.format import count, criterion_figure
 from palpate.learning import History
 from palpate.learning.learn_dataset import LearningHistory
+from palpate.output_files import json_data
 from palpate.validation.figures import FIGURES
 from palpate.validation.figures.figure import Figure
 from palpate.validation.limits import CRITERIA, Check, Limits

@@ -21,7 +21,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.format import json_data
+from palpate.output_files import json_data
 
 __all__ = ["Binary", "Json", "Layout", "Wire"]
 

@@ -56,6 +56,7 @@ def energy_of(network, x: np.ndarray) -> float:
     )
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("strain", "sum_of_directions"),
     [
@@ -96,6 +97,7 @@ def test_a_body_sums_its_mass_and_mixes_materials():
         MassSpringBody(mesh, {"bone": Elastic()})
 
 
+@pytest.mark.full
 def test_a_point_that_belongs_to_nothing_stays():
     mesh = kuhn_block((2, 2, 2))
     points = np.concatenate([mesh.points, [[0.03, 0.03, 0.06]]])

@@ -111,6 +111,7 @@ def test_explicit_steps_are_stable_just_below_their_limit_and_not_above(solver):
         assert (moved < 1e-6) == stable
 
 
+@pytest.mark.full
 def test_implicit_steps_of_any_length_settle_at_the_equilibrium(solver):
     solver.tolerance = 1e-8
     solver.reset()

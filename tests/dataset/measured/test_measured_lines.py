@@ -151,6 +151,7 @@ def test_a_connection_that_breaks_or_says_nothing_ends_cleanly():
     assert not thread.is_alive()
 
 
+@pytest.mark.full
 def test_a_sensor_that_never_reads_its_errors_does_not_stop_the_others():
     port, found, _ = served(stall=20.0)
     with socket.create_connection(("127.0.0.1", port), timeout=30) as sensor:

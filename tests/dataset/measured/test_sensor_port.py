@@ -86,6 +86,7 @@ def test_who_begins_otherwise_is_sent_away_and_the_port_stays(port: Port):
         assert len(found.get(timeout=10)) == 1
 
 
+@pytest.mark.full
 def test_silent_connections_hold_nobody_up(port: Port):
     number, token, found = port()
     silent = [line_to(number) for _ in range(3 * sensor_port._STRANGERS)]

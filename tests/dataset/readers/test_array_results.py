@@ -80,6 +80,7 @@ def test_a_damaged_archive_is_refused(tmp_path):
             read_results(tmp_path / "cut.npz")
 
 
+@pytest.mark.full
 def test_parquet_tables_keep_units_of_names_and_metadata(tmp_path):
     pyarrow = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")

@@ -179,6 +179,7 @@ SMALL = {
 }  # fmt: skip
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", SMALL)
 def test_changed_bytes_are_read_or_refused(tmp_path, name):
     """Bytes changed, cut, doubled and spliced; the first change of each file is none."""

@@ -62,6 +62,7 @@ def imported(beam):
     return pp.import_results([beam / "beam.frd", beam / "beam.dat"], beam / "beam.toml")
 
 
+@pytest.mark.full
 def test_statics_hold_in_what_was_imported(imported):
     data = imported.dataset
     assert len(data) == len(data.ok) == 20
@@ -91,6 +92,7 @@ def learnt(imported):
     return body, test
 
 
+@pytest.mark.full
 def test_an_imported_beam_is_learnt_and_validated(learnt):
     body, test = learnt
     validation = pp.validate(body, test)

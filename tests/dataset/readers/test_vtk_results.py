@@ -49,6 +49,7 @@ def reader(request, monkeypatch):
     return request.param
 
 
+@pytest.mark.grid
 @pytest.mark.usefixtures("reader")
 @pytest.mark.parametrize("coding", ["ascii", "binary", "zlib"])
 def test_a_grid_is_read_with_its_surface_and_components(tmp_path, coding):

@@ -126,6 +126,7 @@ def test_the_order_of_a_record_does_not_matter():
     np.testing.assert_allclose(one.posterior.covariance, other.posterior.covariance, atol=1e-5)
 
 
+@pytest.mark.full
 def test_a_specimen_with_a_stiffer_layer_is_followed_and_the_deviation_shrinks_where_it_was_measured():
     S = model()
     specimen, differs = Phantom(S), Discrepancy()
@@ -143,6 +144,7 @@ def test_a_specimen_with_a_stiffer_layer_is_followed_and_the_deviation_shrinks_w
     assert np.median(found.deviation(unknown)) > 3 * np.median(found.deviation(known))
 
 
+@pytest.mark.full
 def test_more_measurements_mean_less_error():
     S = model()
     specimen = Phantom(S)
@@ -243,6 +245,7 @@ def test_one_component_alone_teaches_only_of_itself():
     assert 0.5 * found == pytest.approx(np.log(1.5), abs=4 * bound)
 
 
+@pytest.mark.full
 def test_windows_bound_what_is_kept_and_change_little():
     S = model()
     X = touches(120, 17)

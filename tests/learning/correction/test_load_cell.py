@@ -77,6 +77,7 @@ def test_one_component_alone_has_an_offset_too():
     assert done.offset[0] == pytest.approx(HEIGHT, abs=1.5e-4)
 
 
+@pytest.mark.full
 def test_without_readings_in_air_height_and_offset_are_called_alike():
     X, F = forces(above=0.0005)
     one = np.argmin(np.abs(X[:, 2, None] - (RADIUS - 0.002)), axis=0)

@@ -60,6 +60,7 @@ def elastic(elements: IwanElements) -> LoadHistory:
     return path(spring, np.linspace(0.02, 0.55, 30), stiffness=K[id(elements)])
 
 
+@pytest.mark.full
 def test_sliders_are_found_to_the_grid_and_answer_unseen_histories() -> None:
     rng = np.random.default_rng(4)
 

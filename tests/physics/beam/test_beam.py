@@ -95,6 +95,7 @@ def ruler(**changes):
     return Cantilever(0.3, section, material, self_weight=True, **changes)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("load", [-500.0, -300.0, 300.0, 500.0])
 def test_far_beyond_the_linear_range_cold_and_warm_starts_agree(load):
     """P L²/EI up to 300: a whole load step from rest ends in an equilibrium with a loop."""

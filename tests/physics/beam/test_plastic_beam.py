@@ -256,6 +256,7 @@ def test_several_loads_with_and_without_a_history():
     np.testing.assert_array_equal(problem.solve((3.0, 55.0, 10.0)).state, path[-1].state)
 
 
+@pytest.mark.full
 def test_a_failed_load_ends_the_history():
     path = beam().problem(TipLoad(0, 100)).solve_path([0.9 * COLLAPSE_LOAD, 2 * COLLAPSE_LOAD, 0.0])
     assert [solution.converged for solution in path] == [True, False, False]

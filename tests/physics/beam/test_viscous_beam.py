@@ -132,6 +132,7 @@ def test_a_small_load_creeps_by_the_compliance(terms):
         np.testing.assert_allclose(expected, (1 - 0.4 * np.exp(-0.6 * times)) / 0.6, rtol=1e-12)
 
 
+@pytest.mark.full
 def test_a_held_tip_relaxes():
     """The load that keeps a small deflection is P g(t): between its samples it errs with their distance squared."""
 
@@ -179,6 +180,7 @@ def test_work_is_stored_or_dissipated_at_large_deflections():
     assert np.all(np.diff([s.dissipated for s in path]) > 0)
 
 
+@pytest.mark.full
 def test_the_load_goes_and_the_bend_fades():
     """At the rate of the slowest pole of the compliance, by the fading memory of the series."""
     times = [0.0, 1.0, 1.0, 9.0, 12.0, 60.0]
@@ -266,6 +268,7 @@ def test_a_column_that_creeps_buckles_in_time():
     np.testing.assert_allclose(falls.displacement, wanted.displacement, atol=1e-6)
 
 
+@pytest.mark.full
 def test_answers_do_not_depend_on_what_was_asked_before():
     problem = preset("beam-viscoelastic").problem()
     solver = problem.open()

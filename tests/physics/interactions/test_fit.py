@@ -44,6 +44,7 @@ def test_the_whole_face_with_its_edges_is_fine():
     assert (whole[1].low, whole[1].high) == pytest.approx((0.0, 0.04))
 
 
+@pytest.mark.full
 def test_a_box_around_a_round_surface_may_be_larger():
     dome = Body(Dome(radius=0.05, element=0.03), NeoHookean(9e3, 0.4))
     probe = SphereProbe(0.015, depth=(0.0, 0.01), over=((-0.06, -0.06), (0.06, 0.06)))

@@ -66,6 +66,7 @@ def case(request):
     return solver, np.array(q), np.diag(steps)
 
 
+@pytest.mark.full
 @pytest.mark.grid
 def test_response_is_the_energy_s_slope(case):
     solver, q, steps = case

@@ -183,6 +183,7 @@ def test_a_compressible_material_is_fitted_with_its_ratio():
     assert "Poisson's ratio 0.4 is given, not fitted" in " ".join(found.notes)
 
 
+@pytest.mark.full
 def test_two_moduli_of_a_compressible_law_come_back_exactly():
     """The sides' stretch, and so the stress, depends on their ratio."""
     law = pp.materials.MooneyRivlin.with_poisson(0.45, c10=1e5, c01=6e4)

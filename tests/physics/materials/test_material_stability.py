@@ -69,6 +69,7 @@ def test_the_quadratic_volume_fails_at_half_the_volume():
     assert verdict(NeoHookean(9e3, 0.45).stability(volume=volume), "volumetric")
 
 
+@pytest.mark.full
 def test_convex_powers_are_stable_everywhere():
     # for μα > 0 in every term W is convex in the log strains (Ogden 1972)
     law = Ogden.with_poisson(0.49, mu=(630.0, 1.2, -10.0), alpha=(1.3, 5.0, -2.0))

@@ -103,6 +103,7 @@ def _plane(ng, slope):
     return ng.CF((1 + slope[0, 0], slope[0, 1], 0, slope[1, 0], 1 + slope[1, 1], 0, 0, 0, 1), dims=(3, 3))
 
 
+@pytest.mark.full
 def test_pressure_follows_the_plastic_front_up_to_the_limit():
     tube, shear = Quarter(0.2), METAL.shear_modulus
     fronts = (0.9, 1.2, 1.4, 1.6, 1.8, 2.0, 2.3, 2.6)

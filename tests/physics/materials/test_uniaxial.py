@@ -134,6 +134,7 @@ def test_ramp_is_exact_in_one_step():
     assert stress == pytest.approx(2e9 * strain / time * integral, rel=1e-12)
 
 
+@pytest.mark.full
 def test_sinusoid_loses_the_energy_of_the_loss_modulus():
     """Loss per cycle π ε₀² E g''(ω); evenly growing strains stand for the sinusoid up to (ω Δ)²."""
     fibre, frequency, steps = UniaxialViscoelastic(2e9, NYLON), 2.0, 400

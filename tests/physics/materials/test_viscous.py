@@ -139,6 +139,7 @@ def test_many_points_at_once_equal_one_by_one():
         assert together[i] == pytest.approx(float(material.energy(many[i], alone, 0.7)), rel=1e-13)
 
 
+@pytest.mark.full
 def test_cycles_of_shear_lose_the_loss_modulus():
     """π γ² G'' per cycle at small strain;"""
     material, frequency, steps, size = Viscoelastic(BASES[1], TERMS[:1]), 2.0, 160, 1e-3
@@ -153,6 +154,7 @@ def test_cycles_of_shear_lose_the_loss_modulus():
     assert np.sum(losses[-steps:]) == pytest.approx(wanted, rel=(frequency * dt) ** 2)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("base", "size"), [(BASES[0], 0.01), (BASES[-1], 0.2)], ids=["small", "large"])
 def test_work_is_stored_or_lost_where_stress_is_linear_in_strain(base, size):
     """Energy balance over a random history, at any strain, to the trapezoid's (Δ/τ)² and steps of strain."""

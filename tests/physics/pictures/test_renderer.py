@@ -45,6 +45,7 @@ def test_values_on_a_cut_are_interpolated(mesh):
     assert np.allclose(faces[:, :, 3], faces[:, :, :3] @ [1.0, 2.0, -3.0], rtol=0, atol=1e-12)
 
 
+@pytest.mark.full
 def test_the_nearer_triangle_hides_the_farther_and_covers_its_area():
     far = [[10.0, 10.0, 0.0], [90.0, 10.0, 0.0], [10.0, 90.0, 0.0]]
     near = [[10.0, 10.0, 1.0], [50.0, 10.0, 1.0], [10.0, 50.0, 1.0]]
@@ -138,6 +139,7 @@ def pixels(picture) -> np.ndarray:
     return matplotlib.image.imread(io.BytesIO(picture._repr_png_()))[:, :, :3]
 
 
+@pytest.mark.full
 def test_the_probe_the_cut_and_the_colours_change_the_picture_where_they_should(made: Made):
     size = (500, 340)
     plain = pixels(plot_solution(made, None, probe=False, fixed=(), outline=False, size=size))

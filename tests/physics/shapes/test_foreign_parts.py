@@ -72,6 +72,7 @@ def test_a_crash_of_a_solver_is_an_error_here():
         apart.solve_apart(Deadly(), np.zeros(1), {})
 
 
+@pytest.mark.full
 def test_an_imported_part_is_solved_apart_with_the_same_bits(tmp_path):
     trimesh.creation.box((40, 40, 20)).export(tmp_path / "box.stl")
     box = ImportedSolid(tmp_path / "box.stl", unit="mm", element=0.04)

@@ -66,6 +66,7 @@ def failure(attempt, kind=UsageError) -> str:
     return str(caught.value)
 
 
+@pytest.mark.full
 def test_step_keeps_names_and_is_read_in_metres(tmp_path: Path):
     write_plate(tmp_path / "plate.step")
     plate = ImportedSolid(tmp_path / "plate.step")
@@ -178,6 +179,7 @@ def test_left_handed_meshes_are_turned(tmp_path: Path):
     assert ImportedMesh(path).rest().volume == pytest.approx(5e-4)
 
 
+@pytest.mark.full
 def test_imported_meshes_are_bisected_where_asked(tmp_path: Path):
     write_tetrahedra(tmp_path / "block.vtu", Block().rest())
     body = ImportedMesh(tmp_path / "block.vtu", patches=(SurfacePatch("top", where=above),))
@@ -191,6 +193,7 @@ def test_imported_meshes_are_bisected_where_asked(tmp_path: Path):
     assert "more than" in failure(lambda: body.mesh((FineMesh("top", 1e-4),)))
 
 
+@pytest.mark.full
 def test_faults_of_surfaces(tmp_path: Path):
     stl = tmp_path / "cube.stl"
     assert write_stl(stl, CUBE, SIDES).rest().volume == pytest.approx(1e-3)
@@ -293,6 +296,7 @@ def test_patches_are_chosen_by_plane_by_direction_and_by_name(tmp_path: Path):
     assert "Did you mean" in failure(lambda: area(faces=("face1",)))
 
 
+@pytest.mark.full
 def test_a_curved_face_of_a_step_file_is_cut_by_the_way_that_it_faces(tmp_path: Path):
     """Of a lying cylinder's side what faces up within 60° gets the name; the rest keeps its own."""
     from netgen.occ import Cylinder, Pnt, X
@@ -351,6 +355,7 @@ def write_limb(path: Path) -> None:
     Compound([muscle, bone]).WriteStep(str(path))
 
 
+@pytest.mark.full
 def test_concentric_solids_keep_their_faces(tmp_path: Path):
     """All faces around the axis have one centre; only the wall between the solids is none of the surface."""
     write_limb(tmp_path / "limb.step")

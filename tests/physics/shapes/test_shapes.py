@@ -84,6 +84,7 @@ def test_names_are_complete(shape):
     assert pickle.loads(pickle.dumps(shape)) == shape
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("shape", VOLUMES, ids=kind)
 def test_volume_is_that_of_the_formula(shape):
     # curved elements of second order miss a round body by a few 1e-4 at five elements per quarter

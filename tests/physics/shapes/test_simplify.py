@@ -30,6 +30,7 @@ def closed(surface: Surface) -> trimesh.Trimesh:
     return mesh
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("noise", [0.0, 2e-5])
 def test_a_sphere_stays_a_sphere(noise: float):
     """Nodes and middles of triangles of both surfaces lie between the spheres that the tolerance allows."""

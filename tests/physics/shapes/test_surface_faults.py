@@ -102,6 +102,7 @@ def test_damaged_files_say_how_far_they_are_whole(path: Path):
     assert "Facet 1 has 4 corners" in refused(read(path, square), FileFormatError)
 
 
+@pytest.mark.full
 def test_a_flat_triangle_goes_and_its_neighbour_is_split(path: Path):
     """The middle of an edge is a node of one side only; a triangle without area joins it to the other."""
     edge = next(

@@ -244,6 +244,7 @@ def test_two_solids_of_one_name_are_two_regions(tmp_path: Path):
     assert part.rest().region_volumes == pytest.approx({"foam 1": 32e-6, "foam 2": 32e-6})
 
 
+@pytest.mark.full
 def test_details_far_below_the_elements_get_no_elements_of_their_own():
     """Fillets of 0.2 mm on the edges of a block take away (1 − π/4) r² of area each, and less at the corners."""
     part = ImportedSolid(FIELD / "step" / "small_fillets.step")

@@ -89,6 +89,7 @@ def test_the_pad_is_never_pressed_past_its_stop():
     assert 0.5 * 0.002 < found.penetration <= 0.98 * 0.002
 
 
+@pytest.mark.full
 def test_a_mesh_too_coarse_for_a_thin_pad_is_called_so():
     """Elements of 11 mm miss a sphere of 10 mm by h²/8R = 1.5 mm: no pad of 1 mm can make up for that."""
     thin = SphereProbe(radius=RADIUS, pad=2e4, stop=0.001)

@@ -140,6 +140,7 @@ def test_force_energy_and_reactions_belong_together(kind, tmp_path):
     assert np.linalg.norm(far.response) < 1e-9 * np.linalg.norm(found.response)
 
 
+@pytest.mark.full
 def test_the_energy_of_a_round_body_does_not_depend_on_the_chain(tmp_path):
     """The zero of U is the body without a probe, not the first place that a chain begins at."""
     problem, touching, normal = dome(tmp_path)

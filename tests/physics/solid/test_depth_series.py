@@ -70,6 +70,7 @@ def test_columns_on_a_dome_are_chains_too():
     assert height.max() == pytest.approx(0.06 + RADIUS, rel=0.02)
 
 
+@pytest.mark.full
 def test_the_contact_points_keep_three_radii_from_the_rim():
     x, y, z = SphereProbe(radius=0.01).ranges(Block((0.1, 0.1, 0.05)))
     assert (x.low, x.high) == pytest.approx((0.03, 0.07))
@@ -77,6 +78,7 @@ def test_the_contact_points_keep_three_radii_from_the_rim():
     assert (z.low, z.high) == pytest.approx((0.045, 0.06))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("surface", ["bottom", "side"])
 def test_any_surface_can_be_touched_from_outside(surface):
     block = Block(SIZE)

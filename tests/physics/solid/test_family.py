@@ -70,6 +70,7 @@ def test_the_response_to_a_property_is_the_slope_of_the_energy(gravity: tuple[fl
         assert response[i] == pytest.approx(-slope, rel=1e-4)
 
 
+@pytest.mark.full
 def test_columns_each_belong_to_one_member() -> None:
     family = problem()
     points = family.design(24, seed=3)

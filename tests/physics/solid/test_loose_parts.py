@@ -32,6 +32,7 @@ def refused(body: Body, *interactions) -> str:
     return str(caught.value)
 
 
+@pytest.mark.full
 def test_a_gap_of_a_drawing_is_told(tmp_path: Path):
     write_boxes(tmp_path / "gap.step", 0.02)
     body = Body(ImportedSolid(tmp_path / "gap.step", element=0.02), SOFT, fixed="bottom")
@@ -50,6 +51,7 @@ def test_a_gap_of_a_drawing_is_told(tmp_path: Path):
     assert Body(touching, SOFT, fixed="bottom").problem(probe).ranges
 
 
+@pytest.mark.full
 def test_shells_of_a_surface_that_hang_apart_are_told(tmp_path: Path):
     boxes = [trimesh.creation.box((40, 40, 20)), trimesh.creation.box((40, 40, 20))]
     boxes[1].apply_translation((0, 0, 25))

@@ -24,6 +24,7 @@ def solver():
     return pressed().open()
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("limit", [1, 3, 5])
 def test_a_path_without_iterations_left_never_converges_short_of_its_target(monkeypatch, solver, limit):
     solver.reset()

@@ -122,6 +122,7 @@ def test_tension_must_be_held():
     assert 'fixed=("bottom", "side")' in str(refused.value)
 
 
+@pytest.mark.full
 def test_a_stretch_can_vary_and_its_slope_is_that_of_the_energy():
     family = BodyFamily(body(1.1), Varied("stretch_x", 1.0, 1.3))
     solver = family.problem(probe(), element=0.012).open()

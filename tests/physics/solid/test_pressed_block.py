@@ -28,6 +28,7 @@ def pressed_in(solver):
     return found
 
 
+@pytest.mark.full
 def test_the_force_is_minus_the_gradient_of_the_energy(solver, pressed_in):
     differences = []
     for axis in np.eye(3) * STEP:
@@ -70,6 +71,7 @@ def test_the_force_is_the_sum_of_the_reactions(solver, pressed_in):
     assert np.linalg.norm(residual) < 1e-8 * np.linalg.norm(support)
 
 
+@pytest.mark.full
 def test_the_same_answer_is_found_warm_cold_and_by_another_path(solver, pressed_in):
     aside = above(0.004, (0.033, 0.029))
     solver.reset()
@@ -82,6 +84,7 @@ def test_the_same_answer_is_found_warm_cold_and_by_another_path(solver, pressed_
     assert around.potential_energy == pytest.approx(pressed_in.potential_energy, rel=1e-10)
 
 
+@pytest.mark.full
 def test_a_chain_has_the_same_bits_each_time(solver):
     chain = [above(depth) for depth in (0.001, 0.003)]
 
@@ -132,6 +135,7 @@ def test_inputs_beyond_their_ranges_are_told(solver):
     assert "beyond range c_z = 0.0315 is not in 0.032 … 0.04 m" in str(deeper)
 
 
+@pytest.mark.full
 def test_a_column_extrapolates_from_depth_to_depth():
     """Four Newton iterations a sample at the median is what the whole sweep must reach."""
     solver = pressed().open()

@@ -41,6 +41,7 @@ def test_an_instant_is_elastic(solver, elastic):
     assert found.strain_energy == pytest.approx(elastic.strain_energy, rel=1e-7)
 
 
+@pytest.mark.full
 def test_a_held_probe_feels_the_force_relax_to_the_slow_limit(solver, elastic):
     """From the instantaneous force down to that of the relaxed moduli, and no further."""
     solver.reset()

@@ -89,6 +89,7 @@ steps = st.lists(
 )
 
 
+@pytest.mark.grid
 @settings(max_examples=60)
 @given(motion=steps)
 def test_no_motion_and_no_step_gains_energy(memory, motion):

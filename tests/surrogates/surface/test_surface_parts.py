@@ -113,6 +113,7 @@ def test_patches_of_a_coarse_tube_lie_on_it_and_its_rim_is_a_circle():
     assert np.abs(patches.normals - radial).max() < 0.005
 
 
+@pytest.mark.full
 def test_the_tree_finds_the_nearest_of_all_triangles():
     rng = np.random.default_rng(0)
     corners = rng.uniform(-1, 1, (301, 1, 3)) + 0.2 * rng.normal(size=(301, 3, 3))
@@ -148,6 +149,7 @@ def test_measured_distance_beside_a_plate_is_that_to_its_rim():
     assert d == pytest.approx(np.linalg.norm(beyond, axis=1), abs=1e-15)
 
 
+@pytest.mark.full
 def test_depths_into_a_dome_are_those_of_its_finite_elements():
     from palpate.physics.interactions.surface_patch import surface_of
     from palpate.physics.shapes.dome import Dome

@@ -116,6 +116,7 @@ def shouldered():
     return TouchedSurface.of(*plate(FACE, 2), radius=R, shoulder=R / 3)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("surface", [face, shouldered, sphere])
 def test_far_away_nothing_is_felt_on_any_side(surface):
     v = np.vstack([directions(4000, 0), [[0, 0, -1], [1, 1, -1], [1, 1, -0.01], [-1, 1, 0]]])
@@ -197,6 +198,7 @@ def test_the_side_of_a_cylinder():
     assert np.abs(gradient[:, 2]).max() < 0.005
 
 
+@pytest.mark.full
 def test_a_box_from_outside_and_inside():
     half = 0.03
     surface = TouchedSurface.of(*box(2 * half, 4), radius=R, spacing=0.0012)

@@ -123,6 +123,7 @@ def damage(content: bytes, rng: np.random.Generator) -> bytes:
     return bytes(data)
 
 
+@pytest.mark.grid
 @pytest.mark.timeout(60)
 @pytest.mark.skipif(sys.platform == "win32", reason="the peak of the memory is asked of POSIX")
 @pytest.mark.parametrize("kind", list(READERS))

@@ -43,6 +43,7 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
+@pytest.mark.full
 def test_a_full_disk_changes_nothing(tmp_path, full_disk):
     old = dataset(4)
     old.save(tmp_path / "a.zarr")

@@ -61,6 +61,7 @@ def test_few_rows_are_interpreted_and_many_compiled_to_the_same_bits(made):
     assert few[6] == many[6]
 
 
+@pytest.mark.full
 def test_a_kernel_for_all_rows_goes_through_that_for_one_until_many_rows_were_asked(made):
     x, y = np.linspace(0.0, 2.0, 7), np.zeros(7)
     for_rows(made.rows, FEW + 1, made.one)(x, y)

@@ -81,6 +81,7 @@ def test_columns_press_the_plane_within_their_depths():
             assert (column.foot[:2] <= 0.03).all()
 
 
+@pytest.mark.full
 def test_a_run_goes_on_where_it_was_and_parts_join(tmp_path, monkeypatch):
     monkeypatch.setitem(STUDIES, "block", STUDY)
     asked = []

@@ -20,6 +20,7 @@ def broken(folder, old: str, new: str):
     return path
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -229,6 +230,7 @@ def files(tmp_path_factory):
     return folder
 
 
+@pytest.mark.full
 @pytest.mark.grid
 @pytest.mark.parametrize(
     ("command", "words"),

@@ -34,6 +34,7 @@ def test_version_and_help(palpate):
         assert command in answer.out
 
 
+@pytest.mark.full
 def test_python_m_palpate_is_palpate():
     done = subprocess.run(
         [sys.executable, "-m", "palpate", "--version"], capture_output=True, text=True, check=True

@@ -111,6 +111,7 @@ def test_a_short_record_says_that_none_of_it_was_left_out(palpate, folder):
     assert "left out  not judged: only files of 10" in palpate(*words).out
 
 
+@pytest.mark.full
 def test_a_body_with_its_shape_stays_one(palpate, folder):
     X, F = measured()
     write_measurements(folder / "specimen.csv", X, F)

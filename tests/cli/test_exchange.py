@@ -28,6 +28,7 @@ def test_a_dataset_goes_out_in_every_format(palpate, folder):
     assert (folder / "two-fields.csv").exists()
 
 
+@pytest.mark.full
 def test_rows_are_chosen(palpate, folder):
     answer = palpate("dataset", "export", folder / "small.zarr", "-o", folder / "a.pvd", "--rows", "0,4:8:2")
     assert answer.code == 0, answer.err

@@ -123,6 +123,7 @@ def test_an_export_replaces_its_own_files_and_no_others(palpate, pad, tmp_path):
     assert "palpate validate" in report.read_text()
 
 
+@pytest.mark.full
 def test_wrong_places_endings_and_compilers_are_refused(palpate, pad, tmp_path):
     (tmp_path / "file").touch()
     for words, said in (

@@ -270,6 +270,7 @@ def test_a_hold_on_the_machine_s_clock_is_asked_for_and_given(palpate, tmp_path)
     assert "a preload, if there was one" in notes
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_whole_record_tells_rise_hold_and_preload(palpate, tmp_path, sign):
     force = sign * (1e3 * relaxing(WHOLE - 2.0) + PRELOAD)

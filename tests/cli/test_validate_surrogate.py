@@ -80,6 +80,7 @@ def test_refined_solves_tell_the_mesh_s_own_error(palpate, folder):
     assert "the mesh alone is off by 2 % median, 2 % p95" in answer.out
 
 
+@pytest.mark.full
 def test_what_can_not_be_judged_is_refused_with_a_way_out(palpate, folder):
     spring_beam().save(folder / "beam.palpate")
     answer = palpate("validate", folder / "beam.palpate")

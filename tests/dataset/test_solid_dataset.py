@@ -129,6 +129,7 @@ def version_1(tmp_path):
     return Dataset.open(tmp_path / "beam.zarr")
 
 
+@pytest.mark.full
 def test_stores_of_version_1_open(version_1, tmp_path):
     data = version_1
     assert data.data.attrs["format_version"] == 1

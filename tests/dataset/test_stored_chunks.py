@@ -141,6 +141,7 @@ def test_damaged_rows_excuse_no_other_change(tmp_path):
     assert "its contents don't match its checksum" in refusal(whole)
 
 
+@pytest.mark.full
 def test_a_chunk_of_another_size_than_its_array_is_refused(store):
     (store / "inputs" / "c" / "0" / "0").write_bytes(Zstd().encode(bytes(80_000)) + CRC)
     assert "80,000 bytes where 512 belong" in refusal(store)

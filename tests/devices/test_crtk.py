@@ -314,6 +314,7 @@ def test_ages_come_from_the_stamps_whatever_clock_they_are_of(service, device, r
     assert rig.now + 0.005 - sample.time == pytest.approx(0.005, abs=1e-4)
 
 
+@pytest.mark.full
 def test_clocks_that_part_slowly_make_no_sample_old(service, device, rig):
     for k in range(300):
         rig.clock.time += 0.1
@@ -375,6 +376,7 @@ def test_late_doubled_and_lost_messages_are_no_fresh_samples(service, device, ri
     assert ages[-1] == pytest.approx(0.0, abs=1e-5)
 
 
+@pytest.mark.full
 @pytest.mark.grid
 @pytest.mark.parametrize(
     ("state", "homed", "words"),
@@ -482,6 +484,7 @@ def test_a_hanging_bridge_can_not_hold_up_the_driver(service, device, rig):
     assert device.sample.time <= now, "its samples get old"
 
 
+@pytest.mark.full
 def test_an_arm_that_sends_too_seldom_is_refused():
     with CrtkRig(rate=20.0) as rig, pytest.raises(DeviceError, match="positions within"):
         rig.open(search=0.5)

@@ -306,6 +306,7 @@ def test_places_and_forces_are_in_the_axes_of_the_traits(motors, name):
     np.testing.assert_allclose(motors.force(), (0.5, 1.0, -1.5))
 
 
+@pytest.mark.grid
 @WITH_MOTORS
 def test_the_hand_is_pushed_back_by_what_the_body_answers(motors, plain, shared):
     """Pressed 10 mm down at ten metres of body to one of hand, a spring of 20 N/m pushes up with 2 N."""
@@ -361,6 +362,7 @@ def test_a_wild_start_is_refused_and_leaves_nothing_behind(name, double):
         rig.open()
 
 
+@pytest.mark.grid
 @WITH_MOTORS
 def test_a_button_of_the_device_stops_the_force(motors, plain, shared):
     loop = motors.loop(plain, shared)

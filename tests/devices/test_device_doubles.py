@@ -22,6 +22,7 @@ def empty(tmp_path):
     return Surroundings(tmp_path, {}, "linux", lambda host, port: False)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("device", sorted(DOUBLES))
 def test_every_double_compiles_and_loads(double, device):
     assert LIBRARIES[device].load(str(double(device)))

@@ -138,6 +138,7 @@ def test_the_zero_force_of_a_stall_is_sent_although_an_answer_is_outstanding(ser
     np.testing.assert_array_equal(service.force(), np.zeros(3))
 
 
+@pytest.mark.full
 def test_lost_and_doubled_answers_are_counted_and_survived(service, device, rig):
     rig.drive(5)
     service.faults.doubled = 3

@@ -84,6 +84,7 @@ def opened(content, *, ends=False):
         channel.close()
 
 
+@pytest.mark.full
 def test_pings_without_end_cost_a_call_no_more_than_its_budget():
     """Each takes a look at the clock after 256 bytes: 80 kB of pings are 310 looks, in calls of a few."""
     with opened(frame(opcode=Opcode.PING) * 40_000 + frame(b"at last")) as (channel, clock, received):

@@ -110,6 +110,7 @@ def test_refined_meets_its_target_with_few_units(wave):
     assert looser.network_.units < model.network_.units
 
 
+@pytest.mark.full
 def test_form_and_kernel_by_trial(wave):
     X, y = wave
     Y = np.vstack([1e3 * y, X[:, 0] ** 2]).T
@@ -360,6 +361,7 @@ def test_parameters_that_can_not_be_are_refused(kind, wrong, wave):
             kind(**wrong).partial_fit(*wave)
 
 
+@pytest.mark.full
 def test_settings_by_hand_and_single_ones(wave):
     X, y = wave
     hand = Settings(distance_min=0.7, units_max=5)

@@ -197,6 +197,7 @@ class _Off:
         return out
 
 
+@pytest.mark.full
 def test_an_export_that_is_off_is_found():
     thing = pp.Surrogate(body("contact").energy)
     assert compare_body(thing, _Off(thing, 1.0)).passed
@@ -219,6 +220,7 @@ def test_a_damaged_table_is_found(tmp_path):
     assert not compare_c(thing, block, done, compiler, single=False).passed
 
 
+@pytest.mark.full
 def test_an_export_that_differs_is_refused_and_leaves_no_file(tmp_path, monkeypatch):
     require_program("gcc")
     thing = pp.Surrogate(body("pad").energy)

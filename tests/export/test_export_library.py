@@ -44,6 +44,7 @@ def test_the_python_wrapper_needs_no_other_package(exported):
     assert "True" in done.stdout
 
 
+@pytest.mark.full
 def test_a_rod_that_is_let_go_lies_where_palpate_finds_it(tmp_path):
     require_program("gcc")
     rod, none = body("iwan"), np.zeros(0)

@@ -42,6 +42,7 @@ def _html(thing: Surrogate, folder: Path) -> tuple[str, str]:
     return found.group(1), done.hash
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("export", [_c, _fmu, _onnx, _html])
 def test_the_card_goes_out(export: Callable[[Surrogate, Path], tuple[str, str]], tmp_path: Path):
     thing = body("contact").signed(author="A. Author </script>", licence="CC-BY-4.0")

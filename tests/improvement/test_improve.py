@@ -86,6 +86,7 @@ def test_a_family_in_the_probes_radius_is_improved(cluster):
     assert np.isfinite(last.train.response[:, :3]).all()
 
 
+@pytest.mark.full
 def test_it_ends_when_the_error_is_kept_on_all_unseen_solves(improve):
     *_, last = improve(until=0.9)
     assert last.reached

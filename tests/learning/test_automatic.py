@@ -29,6 +29,7 @@ def named(Y):
     return [Quantity(f"y{i}") for i in range(Y.shape[1])]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sigma", [0.02, 0.2])
 def test_noise_is_told_by_neighbours(sigma):
     X, Y = bump(500, sigma)

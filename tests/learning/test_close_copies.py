@@ -43,6 +43,7 @@ def test_close_triples_teach_no_less_than_their_centres():
         assert error(triples(centres, step), camel) < 1.2 * alone
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("step", [0.0, 1e-6, 1e-3])
 def test_copies_that_tell_nothing_are_left_out(step):
     centres = box(120, 3)

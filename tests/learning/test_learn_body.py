@@ -129,6 +129,7 @@ def test_ranges_and_symmetry_are_those_of_the_whole():
     assert len(np.unique(columns)) == 6
 
 
+@pytest.mark.full
 def test_the_distance_of_a_surface_is_built_once_for_a_store(tmp_path, monkeypatch):
     store = touches().save(tmp_path / "touches.zarr")
     surface = PressedSolves.of(Dataset.open(store)).surface

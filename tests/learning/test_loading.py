@@ -17,6 +17,7 @@ def histories() -> LoadHistories:
     return LoadHistories(np.array([[0.0, 0.0], [1.0, 0.0]]), 1, np.array([0.0, -1.0]), (one,))
 
 
+@pytest.mark.full
 def test_whatever_a_file_holds_comes_back_as_what_it_is(tmp_path):
     beam, x = spring_beam(), np.linspace(-1.0, 1.0, 30)[:, None]
     fitted = pp.fit(x, x**2, effort=0.05, workers=1)

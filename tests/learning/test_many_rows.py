@@ -94,6 +94,7 @@ def test_a_streamed_step_is_the_step_of_all_rows_at_once():
     assert streamed.cost == pytest.approx(dense.fit.cost, rel=1e-4)
 
 
+@pytest.mark.full
 def test_memory_of_a_step_does_not_grow_with_the_rows():
     X, y = rows_of(80_000)
     regressors, theta = units_at(X, count=40)

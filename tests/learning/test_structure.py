@@ -24,6 +24,7 @@ def bumps(N, seed=0):
     return X, np.column_stack([np.exp(-q(0.3, 1, 2)), np.exp(-q(-0.4, 2, -1)) + X[:, 0]])
 
 
+@pytest.mark.full
 def test_refined_network_is_the_smallest_that_meets_the_target():
     X, Y = stiffening(26)
     unseen, answers = stiffening(333)

@@ -161,6 +161,7 @@ def exists(path: str) -> bool:
     return any(there.endswith("/" + path.strip("/.")) for there in repository_paths())
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_every_path_named_exists(page: Path):
     """A path from the root, or the last part of one: `devices/page.py`, `test_cook.py`."""

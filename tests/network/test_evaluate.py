@@ -19,6 +19,7 @@ every_radial = pytest.mark.parametrize("radial", RADIAL_FUNCTIONS)
 with_and_without_basis = pytest.mark.parametrize("modes", [None, 3])
 
 
+@pytest.mark.grid
 @every_form
 @every_radial
 @with_and_without_basis
@@ -30,6 +31,7 @@ def test_value_is_the_formula(form, radial, modes, n, m):
     np.testing.assert_allclose(network.predict(X), wanted, rtol=0, atol=1e-13 * np.abs(wanted).max())
 
 
+@pytest.mark.grid
 @every_form
 @every_radial
 @with_and_without_basis

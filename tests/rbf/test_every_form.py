@@ -252,6 +252,7 @@ def test_values_slopes_and_curvatures_together_are_one_ridge_regression(name, ra
     np.testing.assert_allclose(state.coefficients, ridge, rtol=1e-10, atol=1e-10 * np.abs(ridge).max())
 
 
+@pytest.mark.grid
 @every_form
 @every_radial
 def test_jacobian_of_slopes_and_curvatures_equals_central_differences(name, radial):

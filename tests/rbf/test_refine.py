@@ -63,6 +63,7 @@ def test_a_network_of_the_same_form_is_found_again():
     assert found.converged
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("solver", ["kaufman", "full"])
 @pytest.mark.parametrize("name", ["isotropic", "axis-aligned", "rotated", "rank-1"])
 @pytest.mark.parametrize("radial", ["gaussian", "inverse-multiquadric", "matern-5/2"])

@@ -41,6 +41,7 @@ def test_a_fault_takes_the_force_is_recorded_and_heals(beam, kind):
     assert outcome.restarted == (kind == "parent gone")
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("kind", ["leap", "answer no number", "clock back", "stop switch"])
 def test_a_body_that_remembers_heals_too(relaxing, kind):
     outcome = relaxing.inject(kind)

@@ -141,6 +141,7 @@ def test_noise_carries_no_energy(noise, late):
     assert ledger.energy == pytest.approx(-work, rel=0.05, abs=chance + noise + passed)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("noise", [0.0, 2e-5, 3e-4])
 @pytest.mark.parametrize("late", [0, 5])
 def test_a_leak_is_paid_while_the_body_is_touched_and_noise_is_not_felt(noise, late):

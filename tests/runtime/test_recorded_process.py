@@ -176,6 +176,7 @@ def test_a_recording_larger_than_memory_is_refused_before_it_is_unfolded(tmp_pat
             assert len(read_trace(path)) == 3000
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("whole", [True, False])
 def test_a_flipped_bit_costs_its_block(tmp_path, whole):
     """Everywhere in the file, in heads and contents, with the file's end and without."""

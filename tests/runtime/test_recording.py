@@ -148,6 +148,7 @@ class Troubled:
         pass
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["beam", "relaxing block"])
 def test_faults_are_replayed_as_they_came(name, tmp_path):
     body = touchable(BODIES[name]())
@@ -169,6 +170,7 @@ def test_every_slot_of_a_sample_is_recorded():
     assert set(Sample.__slots__) == figures | as_flags
 
 
+@pytest.mark.full
 def test_stops_and_a_dead_man_button_are_replayed(tmp_path):
     body, shared = touchable(spring_beam(200.0)), Shared.private()
     device = StrokeDevice(StrokeSettings(frequency=2.0))
@@ -242,6 +244,7 @@ def test_a_recorded_hand_drives_another_body(tmp_path):
         device_named("trace:speed=2", Shared.private().command)
 
 
+@pytest.mark.full
 def test_a_ring_that_nobody_empties_counts_what_it_loses():
     ring = Ring.private(1000.0)
     loop = Loop(
@@ -276,6 +279,7 @@ def test_a_torn_tick_waits_for_its_rest():
     assert ring.lost == 0
 
 
+@pytest.mark.full
 def test_a_replay_that_is_looked_at_has_faults_at_its_own_time_and_ends_within_a_gap(tmp_path):
     shared = Shared.private()
     out = Publisher(shared, 0)

@@ -68,6 +68,7 @@ def test_checksum_catches_what_the_counter_misses(shared):
     reader.close()
 
 
+@pytest.mark.full
 def test_writer_that_died_writing_is_noticed(shared):
     shared.state._sequence[()] += 1
     with pytest.raises(DeviceError, match="stopped while it was publishing"):

@@ -33,6 +33,7 @@ def sent(limits, pieces):
             yield gate, np.array(wanted), safety.force.copy(), age
 
 
+@pytest.mark.full
 @settings(deadline=None)  # a shared machine's pauses are no failures
 @given(limits, history)
 def test_limit_slew_and_gate(limits, pieces):

@@ -228,6 +228,7 @@ def test_mistakes_say_what_is_there(folder, old, new, words):
     assert words in str(caught.value)
 
 
+@pytest.mark.full
 def test_a_study_for_a_part_says_what_its_file_holds(folder):
     study, notes = part_study(folder / "pad.stl")
     said = "\n".join(notes)

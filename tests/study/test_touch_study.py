@@ -126,6 +126,7 @@ def test_a_target_of_zero_asks_nothing():
     assert preset_study("block").target.limits().interval_coverage == (0.80, 0.97)
 
 
+@pytest.mark.full
 def test_columns_have_their_depths_and_tests_have_other_places():
     study = preset_study("block", quick=True)
     problem = study.problem()

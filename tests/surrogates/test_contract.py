@@ -133,6 +133,7 @@ def test_every_baseline_passes_the_checklist(body, check, tmp_path):
     check(body(), tmp_path)
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("body", BODIES, ids=named)
 @pytest.mark.parametrize("memory", MEMORIES, ids=named)
 def test_every_memory_passes_the_checklist_on_every_baseline_or_is_refused(body, memory, tmp_path):

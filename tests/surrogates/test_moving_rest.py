@@ -83,6 +83,7 @@ def test_a_released_body_that_creeps_comes_back_in_time() -> None:
     assert math.log(q[100] / q[300]) == pytest.approx(2.0 * 0.6 / 0.5, rel=2e-3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("elements", [YIELDS, CREEPS], ids=["yields", "creeps"])
 def test_a_random_hand_gets_no_energy_out(elements: IwanElements) -> None:
     rng = np.random.default_rng(2)

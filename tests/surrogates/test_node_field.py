@@ -38,6 +38,7 @@ def test_a_spring_answers_with_its_own_law_wherever_the_hand_strays_sideways(dow
     assert e.inside
 
 
+@pytest.mark.full
 @given(st.floats(1e-6, 0.5))
 def test_the_other_side_is_the_mirror_image(y):
     below, above = felt(spring_beam(), [0.0, -y, 0.0]), felt(spring_beam(), [0.0, y, 0.0])
@@ -100,6 +101,7 @@ def two_loads(compliance: float = 0.01) -> Surrogate:
     return Surrogate(LearntEnergy(network, baseline), {"displacement": field}, meta={"name": "plane"})
 
 
+@pytest.mark.full
 @given(st.floats(-0.2, 0.2), st.floats(-0.1, 0.1))
 def test_two_loads_hold_the_node_where_the_field_says(x, y):
     e = felt(two_loads(), [x, y, 0.0])

@@ -256,6 +256,7 @@ def test_two_runs_of_one_sweep_end_alike(cluster, tmp_path, when):
     assert [p.name for p in tmp_path.iterdir()] == ["a.zarr"]
 
 
+@pytest.mark.full
 def test_another_sweep_that_takes_the_path_meanwhile_is_spared(cluster, tmp_path):
     arguments = {"samples": 8, "cluster": cluster, "path": tmp_path / "a.zarr"}
     other = sweep(Spring(fails=(99.0,)), samples=8, cluster=cluster)

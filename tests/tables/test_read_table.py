@@ -205,6 +205,7 @@ def test_values_are_in_si_units(tmp_path, unit, si, value):
         assert table.values("a")[0] == pytest.approx(value, rel=1e-12)
 
 
+@pytest.mark.full
 def test_a_workbook_is_read_or_says_what_to_install(tmp_path):
     path = tmp_path / "bench.xlsx"
     try:

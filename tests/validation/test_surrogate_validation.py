@@ -43,6 +43,7 @@ def function(change=None, **more) -> TouchFunction:  # type: ignore[no-untyped-d
     return TouchFunction("slab", INPUTS, felt, stiffness=stiffness, depth=lambda X: RADIUS - X[:, 2], **more)
 
 
+@pytest.mark.full
 def test_the_exact_surrogate_has_no_error() -> None:
     v = validate(surrogate(), solves())
     assert v.passed
@@ -71,6 +72,7 @@ def test_too_few_solves_are_cautioned_of_wherever_they_are_read() -> None:
     assert "Caution" not in str(enough)
 
 
+@pytest.mark.full
 def test_a_force_too_large_by_a_tenth_fails_the_lines_of_its_size_alone() -> None:
     """U, F and K are all 1.1 of the truth: 10 % misses the limits of the force and keeps that of the stiffness."""
     v = validate(surrogate(factor=1.1), solves())
@@ -256,6 +258,7 @@ def test_what_is_not_known_is_said_and_not_judged() -> None:
     assert [p.name for p in v.parts] == ["all", "edge of the ranges (5 %)"]
 
 
+@pytest.mark.full
 def test_solves_that_were_trained_on_are_no_test() -> None:
     test = solves()
     low, high = bounds(INPUTS)

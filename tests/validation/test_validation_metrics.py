@@ -115,6 +115,7 @@ def turned(matrix: np.ndarray) -> Validation:
     return validate(model, TouchSolves(X, force_of(X)))
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("degrees", [1e-5, 3.0, 90.0, 180.0])
 def test_a_turned_force_is_off_by_that_angle(degrees: float) -> None:
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))

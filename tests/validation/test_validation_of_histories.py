@@ -94,6 +94,7 @@ def test_histories_of_another_mesh_are_refused() -> None:
         validate(rod(), replace(solved(), paths=()))
 
 
+@pytest.mark.full
 def test_the_report_tells_of_it(tmp_path: Path) -> None:
     found = validate(rod(), solved())
     chapter = Chapter("bent <rod>", rod(), solved(), found, timings={"validate": 1.0})

@@ -127,6 +127,7 @@ def test_displacement_and_force_converge_as_theory_says():
     assert reaction > 2 * K - 0.2
 
 
+@pytest.mark.full
 def test_the_force_is_exact_where_its_adjoint_solution_is_linear():
     """At small strain the reaction to a lift tests equilibrium with uniaxial strain, which the elements hold."""
     assert errors(4, CASES["linear"])[2] < 1e-10

@@ -145,6 +145,7 @@ def test_residual_and_tangent_are_derivatives(law, form):
     assert second < 1e-9
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("law", HISTORIES)
 def test_tangents_of_materials_with_a_history_are_derivatives(law, form):

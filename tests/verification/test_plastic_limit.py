@@ -113,6 +113,7 @@ def test_displacements_alone_never_reach_a_limit():
     assert 1e-4 < mild[-1] - mild[-2] < 2e-3
 
 
+@pytest.mark.full
 def test_all_of_a_tube_at_its_limit_is_at_yield():
     """von Mises' stress at the nodes, through the whole wall."""
     material = metal(0.4999)

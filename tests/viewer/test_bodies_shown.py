@@ -48,6 +48,7 @@ def test_the_skin_of_two_tetrahedra():
     assert {1, 2, 3} not in [set(t) for t in skin.tolist()]
 
 
+@pytest.mark.full
 def test_the_server_sends_what_the_solutions_say():
     solutions = dents(3)
     with BodyViewer(solutions, name="block", port=0) as viewer:

@@ -125,6 +125,7 @@ def test_the_first_view_has_room_for_all_that_the_tip_can_do(page: Page, keep, w
     page.set_viewport_size(before)
 
 
+@pytest.mark.full
 def test_what_is_known_of_the_model_reads_well(page: Page):
     page.click("#about > summary")
     words = " ".join(page.inner_text("#meta").replace("\N{NO-BREAK SPACE}", " ").split())

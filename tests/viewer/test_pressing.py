@@ -94,6 +94,7 @@ def test_force_depth_and_trust_are_the_surrogates_own(pressed_viewer: Viewer, sl
     assert (frame.inside, frame.hold) == (True, Hold.YOURS)
 
 
+@pytest.mark.full
 def test_what_was_not_trained_is_flagged(pressed_viewer: Viewer):
     with client_of(pressed_viewer) as client:
         assert not client.held([0.0, 0.0, pressed.RADIUS - 1.2 * pressed.DEEPEST]).inside
@@ -143,6 +144,7 @@ def test_pushed_too_deep_the_body_returns_to_rest_under_the_hand(pressed_viewer:
         assert client.held([0.0, 0.0, pressed.RADIUS - 0.004]).force[2] > 0
 
 
+@pytest.mark.full
 def test_released_the_force_is_zero_and_the_body_returns_to_rest(pressed_viewer: Viewer):
     with client_of(pressed_viewer) as client:
         assert client.held([0.0, 0.0, pressed.RADIUS - 0.004]).force[2] > 0

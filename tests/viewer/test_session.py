@@ -62,6 +62,7 @@ def test_without_credit_no_frame(viewer: Viewer):
             client.frame(timeout=0.4)
 
 
+@pytest.mark.full
 def test_a_slow_client_gets_the_newest_frame(viewer: Viewer):
     with client_of(viewer) as client:
         client.grant(1)
@@ -73,6 +74,7 @@ def test_a_slow_client_gets_the_newest_frame(viewer: Viewer):
         assert second.tick >= newest > first.tick
 
 
+@pytest.mark.full
 def test_credits_do_not_pile_up(viewer: Viewer):
     with client_of(viewer) as client:
         client.grant(60000)
@@ -85,6 +87,7 @@ def test_credits_do_not_pile_up(viewer: Viewer):
         assert MOST_CREDITS <= frames <= 2 * MOST_CREDITS
 
 
+@pytest.mark.full
 def test_force_and_shape_are_the_models_own(viewer: Viewer, rod: Surrogate):
     y = -0.4 * touchable(rod).reach
     with client_of(viewer) as client:
@@ -114,6 +117,7 @@ def test_two_clients_one_hand(viewer: Viewer, rod: Surrogate):
         assert held(second, -0.2).hold == Hold.YOURS
 
 
+@pytest.mark.full
 def test_a_client_that_vanishes_lets_go(viewer: Viewer):
     with client_of(viewer) as first:
         held(first, -0.2)

@@ -49,6 +49,7 @@ def test_springs_and_volumes_neither_push_nor_turn_the_whole(solver, rumpled):
     assert np.abs(np.cross(rumpled, g).sum(axis=0)).max() < 1e-12 * np.abs(np.cross(rumpled, g)).sum()
 
 
+@pytest.mark.full
 def test_force_is_the_slope_of_the_energy_and_the_fixed_points_bear_it(solver):
     solver.tolerance = 1e-10
     solver.reset()

@@ -97,6 +97,7 @@ def test_silent_connections_hold_nobody_up(port: Port):
         line.close()
 
 
+@pytest.mark.full
 def test_a_silent_connection_is_sent_away_in_time(port: Port, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(sensor_port, "_FIRST_LINE", 0.05)
     number, _, found = port(wait=0.5)

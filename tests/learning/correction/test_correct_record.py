@@ -39,6 +39,7 @@ def test_depths_are_counted_from_first_touch_along_the_direction():
         probe_positions(pressed([0.0, 0.0, 0.2], [0, 0, 1], [0.0], [0.0]), S.baseline.touched, RADIUS)
 
 
+@pytest.mark.full
 def test_depths_and_normal_forces_alone_correct_a_surrogate():
     S = model()
     specimen = scaled(S, 1.4)

@@ -113,6 +113,7 @@ def test_height_and_factor_are_told_apart():
     np.testing.assert_allclose(ratio / before, np.exp(log_factor), rtol=1e-9)
 
 
+@pytest.mark.full
 def test_the_order_of_a_record_does_not_matter():
     S = model()
     X = touches(60, 4)

@@ -110,6 +110,7 @@ def test_far_beyond_the_linear_range_cold_and_warm_starts_agree(load):
     assert -np.sign(load) * cold.displacement[-1, 2] == pytest.approx(np.pi / 2, abs=1e-3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("load", [1000.0, 2000.0])
 def test_a_finer_mesh_reaches_further_by_the_same_branch(load):
     """The tip's turn is a quarter of a circle, without a loop."""

@@ -232,6 +232,7 @@ def test_a_history_can_be_taken_up_again():
     assert last.dissipated == whole[-1].dissipated
 
 
+@pytest.mark.full
 def test_load_and_unload_is_that_history():
     problem = preset("beam-plastic").problem()
     assert [r.name for r in problem.ranges] == ["P_max", "P"]

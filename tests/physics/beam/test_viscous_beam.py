@@ -171,6 +171,7 @@ def test_slow_and_fast_ramps_are_elastic_too():
     assert fast.dissipated < 1e-4 * fast.strain_energy
 
 
+@pytest.mark.full
 def test_work_is_stored_or_dissipated_at_large_deflections():
     """Under a dead load the work after it was put on is P Δu; it is put on at once, and so stored in full."""
     path = march(beam(), [4.0] * 4, [0.0, 0.2, 1.0, 20.0])
@@ -235,6 +236,7 @@ def test_the_tolerance_is_kept():
     assert errors[1] < errors[0] / 10
 
 
+@pytest.mark.full
 def test_a_step_that_is_held_for_no_time_is_the_elastic_answer():
     problem = preset("beam-viscoelastic").problem()
     assert [(r.name, r.unit) for r in problem.ranges] == [("P", "N"), ("P_held", "s")]

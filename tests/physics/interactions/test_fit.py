@@ -18,6 +18,7 @@ def ranges(probe, body=None):
 BLOCK = Body(Block((0.06, 0.04, 0.02)), NeoHookean(9e3, 0.4))
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("touches", "over", "words"),
     [

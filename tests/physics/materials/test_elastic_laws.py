@@ -84,6 +84,7 @@ def element():
     return space, np.array(modes)
 
 
+@pytest.mark.full
 @pytest.mark.grid
 @pytest.mark.parametrize("law", LAWS, ids=IDS)
 def test_a_finite_element_and_an_array_agree_on_energy_stress_and_tangent(law, element):

@@ -113,6 +113,7 @@ def test_constants_replace_the_functions_defaults():
     assert stiffer != gent
 
 
+@pytest.mark.full
 def test_a_finite_element_reads_the_same_function():
     import ngsolve as ng
 

@@ -200,6 +200,7 @@ def test_creep_in_simple_shear():
     assert strain == pytest.approx(wanted, rel=3 * (dt / 2.0) ** 2)
 
 
+@pytest.mark.full
 def test_large_cycles_of_tissue_lose_energy():
     """No theorem at large strain; over these cycles of 60 % shear and stretch the loop's work is positive."""
     material = MATERIALS[1]

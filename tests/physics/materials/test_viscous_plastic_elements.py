@@ -104,6 +104,7 @@ def case(request):
     return material, Cube(material), path, size
 
 
+@pytest.mark.full
 @pytest.mark.grid
 def test_elements_and_arrays_agree(case):
     """Energy, stress and tangent after two steps of history, and the history itself."""

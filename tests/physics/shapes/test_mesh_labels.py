@@ -480,6 +480,7 @@ def write_legacy(path: Path) -> None:
 FORMS = {"lz4.vtu": write_lz4, "text.vtu": write_with_text, "legacy.vtk": write_legacy}
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", FORMS)
 def test_forms_that_only_vtk_reads(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch):
     FORMS[name](tmp_path / name)

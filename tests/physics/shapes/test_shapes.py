@@ -178,6 +178,7 @@ def test_the_fine_rectangle_of_the_block():
     assert np.median(lengths[~inside]) > 0.009
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("size", [0.003, 0.0065])
 def test_a_rectangle_of_a_few_millimetres_is_fine_too(size):
     """The CAD kernel's boxes around faces are 1e-7 m larger than these, which is much for a small one."""

@@ -199,6 +199,7 @@ def test_a_pipe_or_a_device_is_no_part(tmp_path: Path):
             read(tmp_path / name)
 
 
+@pytest.mark.full
 def test_cad_files_of_any_case_and_packed(tmp_path: Path):
     block = ImportedSolid(FIELD / "step" / "BLOCK.STEP")
     assert block.rest().volume == pytest.approx(32e-6)
@@ -207,6 +208,7 @@ def test_cad_files_of_any_case_and_packed(tmp_path: Path):
     assert ImportedSolid(tmp_path / "a.Stp.gz").rest().volume == pytest.approx(32e-6)
 
 
+@pytest.mark.full
 def test_faces_without_a_solid_are_sewn_into_one_and_told(tmp_path: Path):
     from netgen.occ import Box, Compound, Pnt, Z
 

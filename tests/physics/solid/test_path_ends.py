@@ -105,6 +105,7 @@ def test_a_chain_before_a_reset_does_not_change_a_bit():
         assert a.iterations == b.iterations
 
 
+@pytest.mark.full
 def test_a_prescribed_displacement_takes_the_body_along_from_the_start():
     """With the body left behind, elements beside the moved surface turn over, and steps are wasted on them."""
     found = column().solve([-0.012])

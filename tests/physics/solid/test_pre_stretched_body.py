@@ -104,6 +104,7 @@ def test_a_ball_feels_the_same_as_on_a_body_that_was_really_stretched():
     assert found.potential_energy == pytest.approx(truth.potential_energy, rel=0.02)
 
 
+@pytest.mark.full
 def test_a_stretch_of_one_is_none():
     where = (0.031, 0.03, HEIGHT + RADIUS - 0.003)
     plain = (

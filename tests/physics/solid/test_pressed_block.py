@@ -38,6 +38,7 @@ def test_the_force_is_minus_the_gradient_of_the_energy(solver, pressed_in):
     assert error < 1e-5
 
 
+@pytest.mark.full
 def test_the_stiffness_is_the_gradient_of_the_force(solver, pressed_in):
     # a tenth of the step: the stiffness has a kink wherever a quadrature point comes into contact
     h = STEP / 10
@@ -175,6 +176,7 @@ def test_the_mixed_form_is_chosen_and_does_not_lock():
     assert force(0.4999, "displacement") > 1.01 * force(0.4999, "mixed")
 
 
+@pytest.mark.full
 def test_an_incompressible_body_is_solved():
     """ν = 0.5 is the limit of ν → 0.5."""
     assert np.isinf(gel(0.5).bulk_modulus)

@@ -10,6 +10,7 @@ import pytest
 PAGE = (Path(__file__).parents[3] / "docs" / "guide" / "solids.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.full
 def test_a_material_of_ones_own_runs(capsys: pytest.CaptureFixture):
     program = re.search(r"## A material of one's own\n.*?```python\n(.*?)```", PAGE, re.DOTALL)[1]
     names: dict = {"__name__": "page"}

@@ -44,6 +44,7 @@ def test_noise_of_one_per_cent_is_borne(seed):
     assert found.noise == pytest.approx(0.01, rel=0.15)
 
 
+@pytest.mark.full
 def test_standard_errors_are_those_of_repetition():
     """Spread over 30 records and mean standard error agree within four of the spread's own, 4/√(2·29) = 53 %."""
     fits = [identify(noisy(seed=100 + k), most=2) for k in range(30)]

@@ -173,6 +173,7 @@ def test_the_facets_of_a_coarse_ball_do_not_show():
     assert np.abs(hessian - exact)[outside].max() < 0.1 / 0.05
 
 
+@pytest.mark.full
 def test_spacing_is_refined_until_the_error_is_small():
     points, triangles = ball(0.012, 6)
     surface = TouchedSurface.of(points, triangles, radius=0.004, inner=0.004)
@@ -183,6 +184,7 @@ def test_spacing_is_refined_until_the_error_is_small():
     assert np.abs(d - 0.002).max() < 2 * surface.error + facets.max() / 20
 
 
+@pytest.mark.full
 def test_the_side_of_a_cylinder():
     surface = TouchedSurface.of(*tube(0.03, 0.06, 32, 10), radius=R, spacing=0.0015)
     sag = 0.03 * (1 - np.cos(np.pi / 32))

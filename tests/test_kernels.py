@@ -13,7 +13,7 @@ import pytest
 
 from held import INPUTS, drawn
 from models import linear_network
-from palpate.kernels import FEW, MANY, for_rows, interpreted, is_ready
+from palpate.kernels import FEW, MANY, for_rows, is_ready, python_source
 from palpate.network import TrainedRegion
 from palpate.runtime import warm_up
 from palpate.runtime.warm_up import WarmUp
@@ -77,7 +77,7 @@ def test_what_python_refuses_is_answered_as_a_processor_does(made):
     for_rows(made.one, 1)(np.array(x), y, 0)
     assert np.isinf(y[0])
     with pytest.raises(ZeroDivisionError):
-        interpreted(made.ratio)(1.0, 0.0)
+        python_source(made.ratio)(1.0, 0.0)
 
 
 def test_a_part_is_interpreted_where_python_calls_it(made):
@@ -92,7 +92,7 @@ def test_few_inputs_of_networks_and_regions_are_answered_as_many(monkeypatch):
     region = TrainedRegion.of(drawn(50, seed=1))
     compiled = [network.predict(X), network.jacobian(X[0]), network.hessian(X[0]), region.distances(X)]
     for module in ("palpate.network.network", "palpate.network.region"):
-        monkeypatch.setattr(f"{module}.for_rows", lambda own, rows: interpreted(own))
+        monkeypatch.setattr(f"{module}.for_rows", lambda own, rows: python_source(own))
     few = [network.predict(X), network.jacobian(X[0]), network.hessian(X[0]), region.distances(X)]
     for a, b in zip(compiled, few, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-13, atol=0)

@@ -7,7 +7,7 @@ import inspect
 import pytest
 
 from palpate.errors import UsageError
-from palpate.options import EnergyOptions, Noise, SearchOptions, declared, takes
+from palpate.options import EnergyOptions, Noise, SearchOptions, declarations, takes
 
 
 @takes(EnergyOptions)
@@ -34,10 +34,10 @@ def test_a_function_takes_a_record_or_its_fields_as_keywords():
 
 def test_signature_and_help_show_every_option():
     shown = inspect.signature(learn).parameters
-    for name, declaration in declared(EnergyOptions).items():
+    for name, declaration in declarations(EnergyOptions).items():
         assert shown[name].default == declaration.default == getattr(EnergyOptions(), name)
         assert declaration.sentence in learn.__doc__.split("Returns")[0]
-    assert declared(Noise)["absolute"].sentence in Noise.__doc__
+    assert declarations(Noise)["absolute"].sentence in Noise.__doc__
 
 
 @pytest.mark.parametrize(
@@ -48,12 +48,12 @@ def test_an_option_beyond_its_bounds_is_refused_with_its_meaning(wrong):
     (name,) = wrong
     with pytest.raises(UsageError, match=f"The option {name}") as error:
         SearchOptions(**wrong)
-    assert declared(SearchOptions)[name].sentence in error.value.why
+    assert declarations(SearchOptions)[name].sentence in error.value.why
 
 
 def test_keys_of_a_study_are_the_same_options():
     from palpate.study.stage_records import PadLearningRecord
 
     for name in ("effort", "seconds", "workers", "units_max", "target", "seed"):
-        key, declaration = PadLearningRecord.model_fields[name], declared(EnergyOptions)[name]
+        key, declaration = PadLearningRecord.model_fields[name], declarations(EnergyOptions)[name]
         assert (key.default, key.description) == (declaration.default, declaration.text)

@@ -35,7 +35,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
-__all__ = ["FEW", "MANY", "for_rows", "interpreted", "is_ready", "kernel", "part"]
+__all__ = ["FEW", "MANY", "for_rows", "is_ready", "kernel", "part", "python_source"]
 
 FEW = 256
 """Rows that are interpreted sooner than a kernel for them is compiled."""
@@ -133,7 +133,7 @@ class _Part(_Kernel):
     """A part, which Python may call too, for tests; then its source is interpreted."""
 
     def __call__(self, *arguments: Any) -> Any:
-        return interpreted(self)(*arguments)
+        return python_source(self)(*arguments)
 
     def enable_caching(self) -> None:
         self._cache = _PartCache(self.py_func)  # type: ignore[no-untyped-call]
@@ -194,14 +194,14 @@ def kernel(
 
 
 @cache
-def interpreted(compiled: Any) -> Callable[..., Any]:
+def python_source(compiled: Any) -> Callable[..., Any]:
     """Return the source of a kernel or part as a Python function, whose callees are interpreted too."""
     source = compiled.py_func
     names = dict(source.__globals__)
     own = FunctionType(source.__code__, names, source.__name__, source.__defaults__, source.__closure__)
     for name in source.__code__.co_names:
         if isinstance(names.get(name), Dispatcher):
-            names[name] = interpreted(names[name])
+            names[name] = python_source(names[name])
     return own
 
 
@@ -237,7 +237,7 @@ def for_rows(compiled: Any, rows: int, one: Any = None) -> Callable[..., Any]:
     def interpret(*arguments: Any) -> Any:
         try:
             with np.errstate(all="ignore"):
-                return interpreted(compiled)(*arguments)
+                return python_source(compiled)(*arguments)
         except (ArithmeticError, ValueError):
             # Python refuses what a processor answers by ∞ or not-a-number
             return compiled(*arguments)

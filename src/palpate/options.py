@@ -36,7 +36,7 @@ __all__ = [
     "Refinement",
     "SearchOptions",
     "StopOptions",
-    "declared",
+    "declarations",
     "option",
     "takes",
 ]
@@ -99,7 +99,7 @@ def option(default: Any, text: str, unit: str = "", **more: Any) -> Any:
     return field(default=default, metadata={"option": Option(default, text, unit, **more)})
 
 
-def declared(record: Any) -> dict[str, Option]:
+def declarations(record: Any) -> dict[str, Option]:
     """Return the declarations of a record's options by their names."""
     return {f.name: replace(f.metadata["option"], name=f.name, kind=str(f.type)) for f in fields(record)}
 
@@ -108,13 +108,13 @@ class Options:
     """Base of frozen records of options, whose values are checked."""
 
     def __post_init__(self) -> None:
-        for name, declaration in declared(self).items():
+        for name, declaration in declarations(self).items():
             declaration.check(getattr(self, name))
 
 
-def _documented(record: type[R]) -> type[R]:
+def _with_documentation(record: type[R]) -> type[R]:
     """Return a record of options whose documentation lists them all."""
-    entries = "\n".join(declaration.entry for declaration in declared(record).values())
+    entries = "\n".join(declaration.entry for declaration in declarations(record).values())
     record.__doc__ = f"{record.__doc__}\n\n    Attributes\n    ----------\n{entries}\n    "
     return record
 
@@ -125,7 +125,7 @@ def takes(record: Callable[..., Any]) -> Callable[[Callable[..., R]], Callable[.
     Keywords that are given change the record that is given as `options`, or the default one. Signature and
     documentation of the function show them all.
     """
-    known = declared(record)
+    known = declarations(record)
 
     def decorate(function: Callable[..., R]) -> Callable[..., R]:
         @functools.wraps(function)
@@ -153,7 +153,7 @@ def takes(record: Callable[..., Any]) -> Callable[[Callable[..., R]], Callable[.
     return decorate
 
 
-@_documented
+@_with_documentation
 @dataclass(frozen=True)
 class SearchOptions(Options):
     """Work, time and processes of a search."""
@@ -170,7 +170,7 @@ class SearchOptions(Options):
     seed: int = option(0, "decides the starts", least=0)
 
 
-@_documented
+@_with_documentation
 @dataclass(frozen=True)
 class EnergyOptions(SearchOptions):
     """Options of learning an energy."""
@@ -207,7 +207,7 @@ class EnergyOptions(SearchOptions):
     )
 
 
-@_documented
+@_with_documentation
 @dataclass(frozen=True)
 class FieldOptions(SearchOptions):
     """Options of learning a field over a surface."""
@@ -235,7 +235,7 @@ class FieldOptions(SearchOptions):
     )
 
 
-@_documented
+@_with_documentation
 @dataclass(frozen=True)
 class FitOptions(SearchOptions):
     """Options of fitting a network to arrays."""
@@ -268,7 +268,7 @@ class FitOptions(SearchOptions):
     level: float = option(0.9, "share of unseen samples that the intervals are to hold", above=0, below=1)
 
 
-@_documented
+@_with_documentation
 @dataclass(frozen=True)
 class Refinement(Options):
     """Settings of the refinement of what the sequential filter has found."""
@@ -281,7 +281,7 @@ class Refinement(Options):
     starts: int = option(4, "starts per number of units", least=1)
 
 
-@_documented
+@_with_documentation
 @dataclass(frozen=True)
 class StopOptions(Options):
     """When an improvement ends."""
@@ -302,7 +302,7 @@ class StopOptions(Options):
     most: int = option(400, "solves to learn from after which no further batch begins", least=1)
 
 
-@_documented
+@_with_documentation
 @dataclass(frozen=True)
 class ImprovementOptions(StopOptions):
     """Options of an improvement: when it ends, how solves are chosen, and where they are solved."""
@@ -320,7 +320,7 @@ class ImprovementOptions(StopOptions):
     case_limit: float = option(CASE_LIMIT, "time after which a single solve has failed", "s", above=0)
 
 
-@_documented
+@_with_documentation
 @dataclass(frozen=True)
 class Discrepancy(Options):
     """Standard deviations of what a specimen differs by from the model."""
@@ -349,7 +349,7 @@ class Discrepancy(Options):
     )
 
 
-@_documented
+@_with_documentation
 @dataclass(frozen=True)
 class Noise(Options):
     """Standard deviations of one measured component of a force."""
@@ -373,7 +373,7 @@ class Noise(Options):
     )
 
 
-@_documented
+@_with_documentation
 @dataclass(frozen=True)
 class PartOptions(Options):
     """Choices for a part that somebody has."""

@@ -17,7 +17,7 @@ from touch_made import differences
 
 import palpate as pp
 from allocated import kept_by
-from palpate.kernels import interpreted
+from palpate.kernels import python_source
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.energy_kernels import ANSWER, entry_of, trusts_into
 from palpate.surrogates.memories import MemoryState
@@ -202,7 +202,7 @@ def interpreted_kernels_answer_as_compiled_ones(example: Example, folder: Path) 
     energy = example.body.energy
     X = np.ascontiguousarray(energy._places(np.vstack([example.around(30), example.rest[:5]])))
     rows, found = entry_of(energy.baseline.compiled()).rows, []
-    for own in (rows, interpreted(rows)):
+    for own in (rows, python_source(rows)):
         answers, inside = np.empty((len(X), ANSWER)), np.empty(len(X), dtype=bool)
         own(X, answers, inside, *energy.compiled())
         found.append((answers, inside))
@@ -212,7 +212,7 @@ def interpreted_kernels_answer_as_compiled_ones(example: Example, folder: Path) 
         root, net = energy._compiled_posterior()
         inputs, scratch = example.around(30), np.zeros((4, root.shape[1]))
         found = [np.empty(30), np.empty(30)]
-        for own, out in zip((trusts_into, interpreted(trusts_into)), found, strict=True):
+        for own, out in zip((trusts_into, python_source(trusts_into)), found, strict=True):
             own(inputs, answers, out, root, scratch, energy._constants[3], net)
         _agree(*found)
 
@@ -321,7 +321,7 @@ def interpreted_memories_step_as_compiled_ones(example: Example, folder: Path) -
     module = sys.modules[type(body.memory).__module__]
     kernels = {name: own for name, own in vars(module).items() if isinstance(own, Dispatcher)}
     way = body.energy._places(example.around(12))
-    for change in (lambda own: own, interpreted):
+    for change in (lambda own: own, python_source):
         with pytest.MonkeyPatch.context() as patch:
             for name, own in kernels.items():
                 patch.setattr(module, name, change(own))

@@ -15,7 +15,7 @@ import typer
 
 from palpate.errors import UsageError
 from palpate.number_text import whole_number
-from palpate.options import Options, declared
+from palpate.options import Options, declarations
 
 __all__ = ["count_option", "declared_option", "number_option", "with_options"]
 
@@ -81,7 +81,7 @@ def _option(
 
 def declared_option(record: type[Options], field: str, help: str = "") -> Any:
     """Return the declaration of a command's option by that in a record of options; a `help` says it otherwise."""
-    declaration = declared(record)[field]
+    declaration = declarations(record)[field]
     name, text = declaration.flag or f"--{field}".replace("_", "-"), help or declaration.sentence
     if declaration.kind.startswith("float"):
         return number_option(name, declaration.unit, help=text, bare=declaration.bare, **declaration.ends)
@@ -95,7 +95,7 @@ def _parameters(source: Any) -> list[inspect.Parameter]:
         return list(inspect.signature(source, eval_str=True).parameters.values())
     kinds: dict[str, Any] = {"float": float, "int": int, "str": str, "tuple": list[str]}
     parameters = []
-    for name, declaration in declared(source).items():
+    for name, declaration in declarations(source).items():
         if declaration.flag != "none":
             default = None if declaration.default == () else declaration.default
             kind = next(known for word, known in kinds.items() if declaration.kind.startswith(word))

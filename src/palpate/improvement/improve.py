@@ -29,14 +29,14 @@ from palpate.improvement.kept_solves import KeptSolves
 from palpate.improvement.stop_rule import StopRule, relative_errors
 from palpate.learning.learn_dataset import learn as learn_dataset
 from palpate.learning.pressed_solves import PROBES, PressedSolves
-from palpate.options import ImprovementOptions, declared, takes
+from palpate.options import ImprovementOptions, declarations, takes
 from palpate.processes import available_cores
 from palpate.surrogates import Surrogate
 from palpate.sweeps import Problem, local_cluster
 
 __all__ = ["RULES", "ImprovementStep", "improve"]
 
-RULES = declared(ImprovementOptions)["rule"].choices
+RULES = declarations(ImprovementOptions)["rule"].choices
 """Rules that choose the next solves; the last three are there to compare with."""
 
 FIRST = 12  # Sobol places to begin with, of one depth each

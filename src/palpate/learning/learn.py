@@ -340,7 +340,7 @@ def automatic(
     rungs = list(_ladder(xs, ys, target, seed, given))
     if len(X) < _FEWEST or not np.ptp(ys):
         return rungs[len(rungs) // 2]
-    return _tried(rungs, X, Y, inputs, target * _MARGIN, passes, seed, weights)
+    return _best_rung(rungs, X, Y, inputs, target * _MARGIN, passes, seed, weights)
 
 
 def check_target(target: float) -> None:
@@ -384,7 +384,7 @@ def _ladder(
             distance_min=least,
             distance_decay=float((least / whole) ** (3.0 / N)),
         )
-        yield _changed(settings, given)
+        yield _change_settings(settings, given)
 
 
 def _base(N: int, n: int, m: int, noisy: bool) -> Settings:
@@ -404,7 +404,7 @@ def _base(N: int, n: int, m: int, noisy: bool) -> Settings:
     )
 
 
-def _changed(settings: Settings, given: dict[str, Any]) -> Settings:
+def _change_settings(settings: Settings, given: dict[str, Any]) -> Settings:
     try:
         return replace(settings, **given)
     except TypeError as error:
@@ -413,7 +413,7 @@ def _changed(settings: Settings, given: dict[str, Any]) -> Settings:
         ) from error
 
 
-def _tried(
+def _best_rung(
     rungs: Sequence[Settings],
     X: np.ndarray,
     Y: np.ndarray,

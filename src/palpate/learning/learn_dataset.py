@@ -181,7 +181,7 @@ def _recognise(
     train: Dataset, layout: Layout | None, search: SearchOptions, options: Mapping[str, Any]
 ) -> _Recognised:
     """Return the first kind of body that a dataset is of; registered baselines are asked last."""
-    for kind in (_bent, _pressed, _held, _registered):
+    for kind in (_recognise_bent, _recognise_pressed, _recognise_held, _recognise_registered):
         known = kind(train, layout, search, dict(options))
         if known is not None:
             return known
@@ -193,24 +193,24 @@ def _recognise(
     )
 
 
-def _taken(options: dict[str, Any], *names: str) -> dict[str, Any]:
+def _take(options: dict[str, Any], *names: str) -> dict[str, Any]:
     """Return options of these names, and take them out of all."""
     return {name: options.pop(name) for name in names if name in options}
 
 
-def _bent(
+def _recognise_bent(
     train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
 ) -> _Recognised | None:
     del layout
     if "input_node" not in train:
         return None
-    own = _taken(options, "heldout", "settings", "refinement", "passes", "coupling", "progress", "watch")
+    own = _take(options, "heldout", "settings", "refinement", "passes", "coupling", "progress", "watch")
     bent = BentSolves.of(train, search, **own)
     context: dict[str, Any] = {"fields": bent.fields, "meta": bent.meta, "filter": bent.filter.history}
     return _Recognised(bent.baseline, bent.solves, bent.options | options, **context)
 
 
-def _registered(
+def _recognise_registered(
     train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
 ) -> _Recognised | None:
     del layout, search
@@ -221,7 +221,7 @@ def _registered(
     return _Recognised(baseline, solves, {**solves.options, **options})
 
 
-def _pressed(
+def _recognise_pressed(
     train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
 ) -> _Recognised | None:
     if not is_pressed(train):
@@ -251,13 +251,13 @@ def _pressed(
     return _Recognised(baseline, pressed.solves, known | options, learn_field)
 
 
-def _held(
+def _recognise_held(
     train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
 ) -> _Recognised | None:
     del layout, search
     if not is_padded(train):
         return None
     solves = pad_solves(train)
-    baseline = fit_pad(solves, **_taken(options, "degree", "stiffening"))[0]
+    baseline = fit_pad(solves, **_take(options, "degree", "stiffening"))[0]
     known = {"units_max": _PAD_UNITS, "networks": _PAD_NETWORKS}
     return _Recognised(baseline, solves, known | options)

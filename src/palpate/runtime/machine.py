@@ -42,7 +42,7 @@ def survey(root: Path = _ROOT) -> tuple[Check, ...]:
     return (_scheduling(), _wake_up(), *checks)
 
 
-def _found(name: str, ok: bool, detail: str, remedy: str = "") -> Check:
+def _finding(name: str, ok: bool, detail: str, remedy: str = "") -> Check:
     """Return a finding, with what to do about it where it is not as a loop wants it."""
     return Check(name, ok=ok, detail=detail, remedy="" if ok else remedy)
 
@@ -50,13 +50,13 @@ def _found(name: str, ok: bool, detail: str, remedy: str = "") -> Check:
 def _scheduling() -> Check:
     name = "real-time scheduling"
     if sys.platform != "linux":
-        return _found(name, False, f"not used on {platform.system()}", "Use Linux for hardware.")
+        return _finding(name, False, f"not used on {platform.system()}", "Use Linux for hardware.")
     granted: list[bool] = []
     # a thread of its own: on Linux the policy is the calling thread's, and ends with it
     thread = threading.Thread(target=lambda: granted.append(_may_use_fifo()))
     thread.start()
     thread.join()
-    return _found(
+    return _finding(
         name,
         granted == [True],
         f"SCHED_FIFO is {'' if granted == [True] else 'not '}permitted",
@@ -84,12 +84,12 @@ def _wake_up() -> Check:
     median, worst = sorted(late)[len(late) // 2], max(late)
     detail = f"{1e6 * median:.0f} µs late at the median, {1e6 * worst:.0f} µs at worst of {len(late)}"
     remedy = "Close other programs; the loop's spin can't cover this."
-    return _found("wake-up from sleep", median < _SPUN, detail, remedy)
+    return _finding("wake-up from sleep", median < _SPUN, detail, remedy)
 
 
 def _processors() -> Check:
     count = os.cpu_count() or 1
-    return _found(
+    return _finding(
         "CPUs", count > 1, f"{count}", "The loop needs a CPU of its own: give the machine a second one."
     )
 
@@ -97,8 +97,8 @@ def _processors() -> Check:
 def _governor(root: Path) -> Check:
     text = _read(root / "sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
     if text is None:
-        return _found("CPU governor", True, "not readable here")
-    return _found("CPU governor", text != "powersave", text, "cpupower frequency-set -g performance")
+        return _finding("CPU governor", True, "not readable here")
+    return _finding("CPU governor", text != "powersave", text, "cpupower frequency-set -g performance")
 
 
 def _container(root: Path) -> Check:
@@ -116,7 +116,7 @@ def _container(root: Path) -> Check:
     remedy = (
         "Lift the limit of CPU time (--cpus of Docker): once it is used up, every thread stops for a while."
     )
-    return _found("container", limit == math.inf, detail, remedy)
+    return _finding("container", limit == math.inf, detail, remedy)
 
 
 def _load(root: Path) -> Check:
@@ -124,17 +124,17 @@ def _load(root: Path) -> Check:
     try:
         load = float(words[0])
     except (IndexError, ValueError):
-        return _found("load", True, "not readable here")
+        return _finding("load", True, "not readable here")
     share = load / (os.cpu_count() or 1)
     detail = f"{load:.1f} over the last minute, {share:.1f} per CPU"
     remedy = "Close other programs, or wait until they have ended, and look again."
-    return _found("load", share <= _IDLE, detail, remedy)
+    return _finding("load", share <= _IDLE, detail, remedy)
 
 
 def _kernel(root: Path) -> Check:
     realtime = _read(root / "sys/kernel/realtime") == "1"
     detail = f"{platform.system()} {platform.release()}" + (", PREEMPT_RT" if realtime else "")
-    return _found("kernel", True, detail)
+    return _finding("kernel", True, detail)
 
 
 def _read(path: Path) -> str | None:

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from palpate.errors import UsageError
 from palpate.learning import PRESETS, Settings, recommended
 from palpate.learning.pressed_solves import FEWEST
-from palpate.options import EnergyOptions, Options, Refinement, declared
+from palpate.options import EnergyOptions, Options, Refinement, declarations
 from palpate.records import Count, Metres, Newtons, Number, Record, Stiffness
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ __all__ = [
 
 def _key(record: type[Options], name: str, **more: Any) -> Any:
     """Return the key of a table that an option of a record is: its default, bounds and text."""
-    declaration = declared(record)[name]
+    declaration = declarations(record)[name]
     ends = {"ge": declaration.least, "gt": declaration.above, "le": declaration.most, "lt": declaration.below}
     return Field(declaration.default, description=declaration.text, **{**ends, **more})
 

@@ -46,6 +46,12 @@ def test_loaded_network_predicts_bit_identically(archive, path):
     assert again.meta == {"note": "é"}
 
 
+def test_the_same_network_is_the_same_file_each_time(archive, tmp_path):
+    """A recorded touch knows its body again by the checksum of the file."""
+    files = {save_archive(tmp_path / f"{k}.palpate", archive).read_bytes() for k in range(12)}
+    assert len(files) == 1  # by chance, of four entries in any order: 24^-11
+
+
 def test_no_part_of_the_file_is_left_when_it_can_not_be_written(archive, tmp_path):
     with pytest.raises(UsageError, match="Could not write"):
         save_archive(tmp_path / "no" / "m.palpate", archive)

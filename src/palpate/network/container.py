@@ -15,6 +15,7 @@ Version 1 knew Gaussian units only.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -76,7 +77,21 @@ def write_container(path: str | os.PathLike[str], container: Container) -> Path:
             why="What was learnt would take its place.",
             fix="Choose another name, or remove the file yourself.",
         )
-    return write_file(target, save(dict(container.tensors), container.header))
+    return write_file(target, _in_order(save(dict(container.tensors), container.header)))
+
+
+def _in_order(archive: bytes) -> bytes:
+    """Return an archive with the entries of its metadata in the order of their names.
+
+    safetensors writes them in one that differs from call to call, so that the same body would be another file each
+    time; a recorded touch knows its body again by the checksum of the file.
+    """
+    end = 8 + int.from_bytes(archive[:8], "little")
+    table = json.loads(archive[8:end])
+    table["__metadata__"] = dict(sorted(table["__metadata__"].items()))
+    text = json.dumps(table, ensure_ascii=False, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 8)  # the numbers behind it begin at a multiple of eight bytes
+    return b"".join((len(text).to_bytes(8, "little"), text, archive[end:]))
 
 
 def read_container(path: str | os.PathLike[str]) -> Container:

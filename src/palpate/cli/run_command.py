@@ -13,6 +13,7 @@ from pathlib import Path
 from palpate.cli.console import Console
 from palpate.cli.live_table import live_table
 from palpate.cli.terminal_keys import RESUME, STOP, Keys, terminal_keys
+from palpate.devices import device_traits
 from palpate.format import share
 from palpate.runtime import LoopProcess
 from palpate.runtime.shared_state import State
@@ -91,6 +92,7 @@ def run_loop(
     file that takes every tick; if it stops by itself the loop runs on, and a `ResourceError` follows the report.
     """
     touch = load_touchable(model)
+    device_traits(device)  # a name that is none is refused before anything is compiled
     settings = touch.meta.get("runtime", {})
     rate = rate or settings.get("rate", 1000.0)
     if warning := correction_warning(touch.meta):

@@ -42,7 +42,7 @@ KEPT = {
     "schema": _AS_BEFORE,
     "show": "The solved bodies are as they were.",
     "sweep": _GOES_ON,
-    "touch": "Study, solves and surrogates are kept beside the part: the same command goes on.",
+    "touch": "What was begun is kept beside the part: the same command goes on.",
     "trace": _WHOLE,
     "validate": "The model and its solves are as they were; the same command judges again.",
     "view": "The model is as it was.",

@@ -14,7 +14,7 @@ from palpate.cli.console import Console
 from palpate.cli.live_table import live_table
 from palpate.cli.terminal_keys import RESUME, STOP, Keys, terminal_keys
 from palpate.devices import device_traits
-from palpate.format import share
+from palpate.format import duration, share
 from palpate.runtime import LoopProcess
 from palpate.runtime.shared_state import State
 from palpate.runtime.touchable import load_touchable
@@ -24,6 +24,7 @@ from palpate.surrogates.surrogate import correction_warning
 __all__ = ["run_loop"]
 
 LOOK = 0.02  # s between two looks at the loop
+_WHOLE = 0.95  # share of the nominal ticks from which on none is missed by a person who counts
 _REFRESH = 10.0  # Hz, of the live table
 _HEEDED = 0.2  # change of the spring in front of a stiff body from which on it is said again: a tenth is hardly felt
 
@@ -99,6 +100,7 @@ def run_loop(
         console.say(f"its correction was warned of: {warning}")
     limit = settings.get("max_force")
     peak = _Peak()
+    began = time.monotonic()
     warm_up = WarmUp("loop", body=touch)
     if warm_up.words:
         console.say(f"{warm_up.words} …")
@@ -120,11 +122,18 @@ def run_loop(
         terminal_keys() as keys,
         _shown(loop, console, keys, holds=touch.holds) as show,
     ):
+        ready = time.monotonic()
+        console.say(f"The loop runs for {duration(seconds)}; it took {duration(ready - began)} to start.")
         _wait(loop, seconds, console, peak, keys, show)
+    ran = time.monotonic() - ready
     report = loop.report()  # after the end: only then is it known what the system granted
     words, facts = _recording(loop)
+    slower = "" if report.ticks > _WHOLE * rate * ran else "; it ticks slower while nobody touches"
+    timing = f"  time       {duration(ran)}, after {duration(ready - began)} to start{slower}"
+    facts |= {"seconds": ran, "start_seconds": ready - began}
     console.result(
-        f"{report}\n{peak.words(holds=touch.holds)}{words}", report.as_dict() | peak.as_dict() | facts
+        f"{report}\n{timing}\n{peak.words(holds=touch.holds)}{words}",
+        report.as_dict() | peak.as_dict() | facts,
     )
     if loop.recording is not None and loop.recording.error is not None:
         raise loop.recording.error

@@ -7,7 +7,8 @@
     shape     an array of real numbers of a given shape
     triple    three numbers along x, y and z
 
-and `own_arrays`, which makes the arrays of a frozen dataclass read-only.
+and `own_arrays`, which makes the arrays of a frozen dataclass read-only, and `did_you_mean`, the question that offers
+the nearest choice wherever a name is mistyped.
 
 Import the module and name it in the call, ``checks.positive("The radius", radius, "m")``: the verbs alone are too
 common as names. `what` is the quantity's name as a sentence begins with it, with its article; `unit` is the SI unit
@@ -18,7 +19,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,9 @@ from palpate.errors import UsageError
 if TYPE_CHECKING:
     import numpy as np
 
-__all__ = ["finite", "fits", "one_of", "own_arrays", "positive", "shape", "triple"]
+__all__ = ["did_you_mean", "finite", "fits", "one_of", "own_arrays", "positive", "shape", "triple"]
+
+_SURE = 0.75  # how alike a mistyped word must be to one that merely stands for a choice
 
 
 def finite(what: str, value: Any, unit: str = "") -> float:
@@ -98,12 +101,33 @@ def one_of(what: str, value: Any, choices: Sequence[str]) -> str:
     """Return a word that is among the choices, spelt as they are; otherwise the error's message offers the nearest."""
     if isinstance(value, str) and value in choices:
         return value
-    near = difflib.get_close_matches(str(value).lower(), choices, n=1, cutoff=0.5)
     raise UsageError(
         f"{what} is {value!r}.",
         why=f"It is one of {', '.join(map(repr, choices))}.",
-        fix=f"Did you mean {near[0]!r}?" if near else "Choose one of these.",
+        fix=did_you_mean(value, choices, shown=repr, cutoff=0.5) or "Choose one of these.",
     )
+
+
+def did_you_mean(
+    word: Any,
+    choices: Iterable[str],
+    *,
+    meant: Mapping[str, str] | None = None,
+    shown: Callable[[str], str] = str,
+    cutoff: float = 0.6,
+) -> str:
+    """Return a question that offers the choice nearest to a word, in whatever case; "" where none is near.
+
+    `meant` has other words for choices: the word itself among them goes before all spelling, one spelt like it comes
+    last. `shown` writes a choice as a person types it; `cutoff` is how alike words must be, from 0 to 1.
+    """
+    typed = str(word).strip().lower()
+    by_word = {other.lower(): choice for other, choice in (meant or {}).items()}
+    own = {choice.lower(): choice for choice in choices}
+    near = [by_word[typed]] if typed in by_word else []
+    for known, alike in ((own, cutoff), (by_word, max(cutoff, _SURE))):
+        near += [known[name] for name in difflib.get_close_matches(typed, known, n=1, cutoff=alike)]
+    return f"Did you mean {shown(near[0])}?" if near else ""
 
 
 def shape(

@@ -19,8 +19,10 @@ __all__ = [
     "end_group",
     "end_with_input",
     "helper_environment",
+    "interrupts",
     "is_supervised",
     "kill_group",
+    "note_interrupt",
 ]
 
 CASE_LIMIT = 3600.0
@@ -94,3 +96,20 @@ def is_supervised() -> bool:
 def end_by_sigterm(number: int, frame: FrameType | None) -> None:
     """End this process as SIGTERM asks, but through all clean-up; a handler for `signal.signal`."""
     sys.exit(128 + number)
+
+
+_interrupts: list[int] = []
+
+
+def note_interrupt(number: int, frame: FrameType | None) -> None:
+    """Interrupt this process as Ctrl-C does, and remember the signal; a handler for `signal.signal`.
+
+    A page or a loop takes the `KeyboardInterrupt` as its end in good order; the program has to know it afterwards.
+    """
+    _interrupts.append(number)
+    raise KeyboardInterrupt
+
+
+def interrupts() -> tuple[int, ...]:
+    """Return the signals by which `note_interrupt` has interrupted this process."""
+    return tuple(_interrupts)

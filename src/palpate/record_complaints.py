@@ -5,7 +5,6 @@ Pydantic finds the mistakes; none of its own messages reaches a reader.
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from palpate.checks import did_you_mean
 from palpate.records import Unit
 
 __all__ = ["complaints", "range_words", "unit_in"]
@@ -172,8 +172,8 @@ def _none_of(item: Any, place: _Place, shown: str) -> str:
 
 
 def _close(word: str, known: Sequence[str] | set[str]) -> str:
-    close = difflib.get_close_matches(word, known, n=1)
-    return f"; did you mean {close[0]!r}?" if close else ""
+    question = did_you_mean(word, known, shown=repr)
+    return f"; d{question[1:]}" if question else ""
 
 
 def _out_of_range(shown: str, missed: dict[str, float], place: _Place) -> str:

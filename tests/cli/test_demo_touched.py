@@ -16,7 +16,8 @@ pytestmark = [pytest.mark.full, pytest.mark.timeout(900)]
 
 def test_quick_demos_keep_their_limits_and_leave_everything_behind(palpate, tmp_path):
     """The outcome is read, not the exit code alone."""
-    answer = palpate("demo", "block", "--quick", "--no-view", "--json", "--folder", tmp_path)
+    words = ("demo", "block", "--quick", "--no-view", "--folder", tmp_path)
+    answer = palpate(*words, "--json")
     assert answer.code == 0, answer.out + answer.err
     told = json.loads(answer.out)
     quick = "block-quick"
@@ -42,3 +43,8 @@ def test_quick_demos_keep_their_limits_and_leave_everything_behind(palpate, tmp_
         "Worst cases",
     ):
         assert page.count(f">{heading}<") == 1
+    lines = palpate(*words).out.splitlines()
+    assert 5 <= len(lines) <= 8
+    assert lines[0] == "block-quick on 12 unseen solves: every limit kept"
+    assert lines[1].endswith("than a person notices")
+    assert lines[-1].endswith("palpate init --sample kidney.stl, palpate touch kidney.stl")

@@ -4,6 +4,6 @@ Progress goes to stderr, results to stdout. Exit codes: 0 ok, 1 accuracy target 
 device failure, 130 interrupted.
 """
 
-from palpate.cli.app import main
+from palpate.cli.program import main
 
 __all__ = ["main"]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from palpate.cli.console import Console, advice_in_words
+from palpate.cli.command_names import CommandGroup
+from palpate.cli.console import Console
 from palpate.cli.device_commands import devices_app
 from palpate.cli.exchange_commands import card, export_dataset
 from palpate.cli.export_commands import export_app
@@ -17,26 +17,25 @@ from palpate.cli.material_commands import material_app
 from palpate.cli.number_options import count_option, number_option
 from palpate.cli.sweep_command import sweep
 from palpate.cli.table_commands import correct, fit
-from palpate.cli.table_options import Force, Json, with_table_options
+from palpate.cli.table_options import Force, Json, Verbose, with_table_options
 from palpate.cli.touch_command import touch
 from palpate.cli.touch_options import DeadMan, Device, NoController, Unsoftened
 from palpate.cli.trace_commands import replay, trace_app
-from palpate.errors import AccuracyError, PalpateError, UsageError
-from palpate.files import explain_system_error
-from palpate.processes import CASE_LIMIT, end_by_sigterm
+from palpate.errors import UsageError
+from palpate.processes import CASE_LIMIT
 
-__all__ = ["app", "main"]
+__all__ = ["app"]
 
 app = typer.Typer(
     name="palpate",
+    cls=CommandGroup,
     help="Turn a finite-element model into something you can touch.",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
 )
 
-dataset_app = typer.Typer(help="Datasets of solves.", no_args_is_help=True)
+dataset_app = typer.Typer(cls=CommandGroup, help="Datasets of solves.", no_args_is_help=True)
 app.add_typer(dataset_app, name="dataset")
 app.add_typer(devices_app, name="devices")
 app.add_typer(material_app, name="material")
@@ -79,8 +78,6 @@ StrictPort = Annotated[bool, typer.Option("--strict-port", help="Stop with an er
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a web browser.")]
 
 STUDY = Path("study.toml")
-_INTERRUPTED = 130  # the shell's code of a program that Ctrl-C has ended
-_TERMINATED = 128 + signal.SIGTERM  # and of one that was asked to end
 
 
 @app.callback(invoke_without_command=True)
@@ -116,12 +113,13 @@ def demo(
     port: Port = None,
     browser: Browser = True,
     token: AskToken = True,
+    verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
     """Run named studies completely: solve, learn, check, show. The two beams take about a minute on two idle cores."""
     from palpate.cli.demo_command import run_demo
 
-    console = Console(as_json)
+    console = Console(as_json, verbose)
     names = names or ["beam-copper", "beam-nylon"]
     models = run_demo(names, folder, workers, console, quick=quick, case_limit=case_limit)
     if view and not as_json:
@@ -225,12 +223,13 @@ def validate(
     report: Annotated[
         bool, typer.Option("--report/--no-report", help="Write a report as an HTML page.")
     ] = True,
+    verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
     """Check a surrogate with solves that it was not learnt from. The exit code is 1 if a limit is missed."""
     from palpate.cli.study_commands import is_archive, validate_model, validate_study_file
 
-    console = Console(as_json)
+    console = Console(as_json, verbose)
     if is_archive(study):
         if trace:
             raise UsageError(
@@ -446,9 +445,9 @@ def _serve(
     from palpate.viewer import serve
 
     body = load_touchable(model)
+    device = aim_device(device, body)  # a name that is none is refused before anything is compiled
     with WarmUp("loop", body=body) as warm_up:
         Console().say(f"Opening the page of {model} … {warm_up.words}".rstrip())
-        device = aim_device(device, body)
         warm_up.wait()
     settings = body.meta.get("runtime", {})
     serve(
@@ -464,31 +463,3 @@ def _serve(
         controller=controller,
         dead_man=dead_man,
     )
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; an error that palpate foresaw ends with its exit code and without a traceback."""
-    words = sys.argv[1:] if arguments is None else arguments
-    # a program that calls this keeps its own way to end
-    if arguments is None and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
-        signal.signal(signal.SIGTERM, end_by_sigterm)  # temporary folders are removed on the way
-    try:
-        with advice_in_words():
-            app(words, standalone_mode=True)
-    except AccuracyError as error:
-        Console().error(error)  # the figures have been printed already, as JSON where asked
-        sys.exit(error.exit_code)
-    except PalpateError as error:
-        Console(as_json="--json" in words).error(error)
-        sys.exit(error.exit_code)
-    except (OSError, MemoryError) as error:  # 1, which Python would end with, says that a target was missed
-        known = explain_system_error(f"palpate {words[0] if words else ''} could not go on.", error)
-        Console(as_json="--json" in words).error(known)
-        sys.exit(known.exit_code)
-    except SystemExit as end:
-        if end.code in (_INTERRUPTED, _TERMINATED):  # as which Typer ends by Ctrl-C, without a word
-            goes_on = {"sweep", "demo", "touch"} & set(words)
-            kept = " What is solved is kept: the same command goes on." if goes_on else ""
-            way = "Interrupted" if end.code == _INTERRUPTED else "Ended from outside (SIGTERM)"
-            Console().say(f"\n{way}.{kept}")
-        raise

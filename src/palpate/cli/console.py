@@ -49,6 +49,7 @@ class Console:
     """Printer of a command."""
 
     as_json: bool = False  # results as one JSON object on stdout, and no progress
+    verbose: bool = False  # all figures, where a verdict is printed else
 
     def say(self, text: str) -> None:
         """Print one line of progress to stderr."""

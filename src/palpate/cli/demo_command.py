@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from palpate.cli.console import Console
-from palpate.errors import AccuracyError
+from palpate.cli.verdict_lines import raise_misses, verdict_text
 from palpate.files import system_errors
+from palpate.format import duration
 from palpate.processes import CASE_LIMIT
 from palpate.runtime.warm_up import WarmUp
 from palpate.study import Study, preset_study
@@ -16,6 +17,8 @@ from palpate.study.run import Outcome, Paths, carry_out, report_study
 from palpate.sweeps import LocalCluster, local_cluster
 
 __all__ = ["run_demo"]
+
+_ORGAN = "and an organ of your own: palpate init --sample kidney.stl, palpate touch kidney.stl"
 
 
 def run_demo(
@@ -45,9 +48,14 @@ def run_demo(
     name = studies[0].name if len(studies) == 1 else "report"
     report = report_study(folder / f"{name}.html", outcomes)
     seconds = time.perf_counter() - began
-    console.result(_summary(outcomes, report, seconds), _content(outcomes, report, seconds))
-    _judge(outcomes)
-    return [Paths(folder, study.name).model for study in studies]
+    models = [Paths(folder, study.name).model for study in studies]
+    judged = [outcome.validation for outcome in outcomes]
+    console.say(f"done in {duration(seconds)}")
+    text = verdict_text(judged, console, report=report, next_step=f"palpate view {models[-1]}")
+    console.result(f"{text}\n{_ORGAN}", _content(outcomes, report, seconds))
+    for validation in judged:
+        raise_misses(validation, console)
+    return models
 
 
 def _carry_out(
@@ -63,26 +71,9 @@ def _carry_out(
     )
 
 
-def _summary(outcomes: Sequence[Outcome], report: Path, seconds: float) -> str:
-    parts = [f"\n{o.validation}" for o in outcomes]
-    last = outcomes[-1].study
-    model = Paths(report.parent, last.name).model
-    return "\n".join(
-        [*parts, "", f"report  {report}", f"model   {model}   (palpate view {model})", f"{seconds:.0f} s"]
-    )
-
-
 def _content(outcomes: Sequence[Outcome], report: Path, seconds: float) -> dict[str, object]:
     return {
         "studies": {o.study.name: o.validation.as_dict() for o in outcomes},
         "report": str(report),
         "seconds": seconds,
     }
-
-
-def _judge(outcomes: Sequence[Outcome]) -> None:
-    for o in outcomes:
-        try:
-            o.validation.raise_if_failed()
-        except AccuracyError as error:
-            raise AccuracyError(f"{o.study.name}: {error.what}", why=error.why, fix=error.fix) from error

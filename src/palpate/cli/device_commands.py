@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.simulate_commands import simulate_app
 from palpate.cli.table_options import Json
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["devices_app", "findings_in_words"]
 
-devices_app = typer.Typer(help="Devices for the hand: what is there, and what to do for the others.")
+devices_app = typer.Typer(
+    cls=CommandGroup, help="Devices for the hand: what is there, and what to do for the others."
+)
 devices_app.add_typer(simulate_app, name="simulate")
 
 _MARKS = {"ready": "✓", "present": "○", "absent": "·"}

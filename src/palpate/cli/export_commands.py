@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["export_app"]
 
 export_app = typer.Typer(
+    cls=CommandGroup,
     help="Take a learnt body or a network into other tools: C99, a library, an FMU, ONNX, one HTML file.",
     no_args_is_help=True,
 )

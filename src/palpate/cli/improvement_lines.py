@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from palpate.cli.verdict_lines import verdict_text
 from palpate.errors import AccuracyError
 from palpate.format import count, duration, share
 
@@ -38,15 +39,14 @@ def improve_file(
         record = read_study(file).with_workers(options.workers)
     paths = Paths(file.parent, record.name)
     outcome, content, failure = improve_and_print(record, paths, options, console, cluster=scheduler)
-    lines = [
-        content["reason"],
-        f"{paths.data}: {count(len(outcome.train), 'solve')} to learn from",
-        f"{paths.random}: {count(len(outcome.test), 'unseen solve')}",
-        f"{paths.model}",
-    ]
+    lines = [] if failure is not None else [content["reason"]]  # which the error says too
+    lines.append(
+        f"solves  {paths.data} ({len(outcome.train)} to learn from), {paths.random} ({len(outcome.test)} unseen)"
+    )
+    then = f"palpate view {paths.model}, palpate validate {file}"
+    lines.append(verdict_text([outcome.validation], console, report=None, next_step=then))
     files = {"data": str(paths.data), "random": str(paths.random)}
     console.result("\n".join(lines), content | files | {"passed": outcome.validation.passed})
-    console.say(f"Next: palpate validate {file}, palpate view {paths.model}")
     if failure is not None:
         raise failure
 

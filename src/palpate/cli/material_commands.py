@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.number_options import number_option
 from palpate.cli.table_options import Force, Json, with_table_options
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["fit_material", "material_app"]
 
-material_app = typer.Typer(help="Materials: constants from tests.", no_args_is_help=True)
+material_app = typer.Typer(cls=CommandGroup, help="Materials: constants from tests.", no_args_is_help=True)
 
 
 @material_app.command()

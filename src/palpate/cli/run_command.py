@@ -13,7 +13,8 @@ from pathlib import Path
 from palpate.cli.console import Console
 from palpate.cli.live_table import live_table
 from palpate.cli.terminal_keys import RESUME, STOP, Keys, terminal_keys
-from palpate.format import share
+from palpate.devices import device_traits
+from palpate.format import duration, share
 from palpate.runtime import LoopProcess
 from palpate.runtime.shared_state import State
 from palpate.runtime.touchable import load_touchable
@@ -23,19 +24,22 @@ from palpate.surrogates.surrogate import correction_warning
 __all__ = ["run_loop"]
 
 LOOK = 0.02  # s between two looks at the loop
+_WHOLE = 0.95  # share of the nominal ticks from which on none is missed by a person who counts
 _REFRESH = 10.0  # Hz, of the live table
 _HEEDED = 0.2  # change of the spring in front of a stiff body from which on it is said again: a tenth is hardly felt
 
 
 @dataclass
 class _Peak:
-    """The largest force (N) and depth (m) that were seen, and how often the hand was where nothing was trained."""
+    """Course of a run: its times, the largest force (N) and depth (m), and how often the hand was beyond training."""
 
     force: float = 0.0
     depth: float = -math.inf
     looks: int = 0
     outside: int = 0
     let_go: int = 0
+    start: float = 0.0  # s until the first tick
+    seconds: float = 0.0  # s from then on
 
     def see(self, state: State) -> None:
         """Take one look at the loop."""
@@ -44,6 +48,11 @@ class _Peak:
         self.looks += 1
         self.outside += not state.inside
         self.let_go += state.let_go and not state.waiting
+
+    def timing(self, *, slow: bool) -> str:
+        """Return in a line how long the loop ran and started; `slow` says that ticks are missing for its rate."""
+        slower = "; it ticks slower while nobody touches" if slow else ""
+        return f"  time       {duration(self.seconds)}, after {duration(self.start)} to start{slower}"
 
     def words(self, *, holds: bool) -> str:
         """Return the figures as lines for a person; `holds` says whether the device held the body."""
@@ -68,6 +77,8 @@ class _Peak:
             "largest_depth": max(self.depth, 0.0),
             "outside": self.outside / looks,
             "let_go": self.let_go / looks,
+            "seconds": self.seconds,
+            "start_seconds": self.start,
         }
 
 
@@ -91,12 +102,14 @@ def run_loop(
     file that takes every tick; if it stops by itself the loop runs on, and a `ResourceError` follows the report.
     """
     touch = load_touchable(model)
+    device_traits(device)  # a name that is none is refused before anything is compiled
     settings = touch.meta.get("runtime", {})
     rate = rate or settings.get("rate", 1000.0)
     if warning := correction_warning(touch.meta):
         console.say(f"its correction was warned of: {warning}")
     limit = settings.get("max_force")
     peak = _Peak()
+    began = time.monotonic()
     warm_up = WarmUp("loop", body=touch)
     if warm_up.words:
         console.say(f"{warm_up.words} …")
@@ -118,12 +131,14 @@ def run_loop(
         terminal_keys() as keys,
         _shown(loop, console, keys, holds=touch.holds) as show,
     ):
+        peak.start = time.monotonic() - began
+        console.say(f"The loop runs for {duration(seconds)}; it took {duration(peak.start)} to start.")
         _wait(loop, seconds, console, peak, keys, show)
     report = loop.report()  # after the end: only then is it known what the system granted
     words, facts = _recording(loop)
-    console.result(
-        f"{report}\n{peak.words(holds=touch.holds)}{words}", report.as_dict() | peak.as_dict() | facts
-    )
+    slow = report.ticks < _WHOLE * rate * peak.seconds
+    text = f"{report}\n{peak.timing(slow=slow)}\n{peak.words(holds=touch.holds)}{words}"
+    console.result(text, report.as_dict() | peak.as_dict() | facts)
     if loop.recording is not None and loop.recording.error is not None:
         raise loop.recording.error
 
@@ -169,7 +184,8 @@ def _wait(
     show: Callable[[State], None],
 ) -> None:
     """Look at the force while the loop runs, show it, and heed the keys."""
-    end, shown = time.monotonic() + seconds, -math.inf
+    began = time.monotonic()
+    end, shown = began + seconds, -math.inf
     coupling = math.nan  # nothing was said yet
     if note := loop.report().device_note:
         console.say(f"{note}.")
@@ -179,6 +195,7 @@ def _wait(
             loop.shared.write_command(stop=wish == STOP, resume=wish == RESUME)
         state = loop.read()
         peak.see(state)
+        peak.seconds = time.monotonic() - began
         with_motors = state.felt_stiffness.damping is not None
         if with_motors and not math.isclose(state.coupling, coupling, rel_tol=_HEEDED):
             coupling = state.coupling

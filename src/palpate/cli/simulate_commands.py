@@ -13,6 +13,7 @@ from typing import Annotated
 
 import typer
 
+from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Json
@@ -20,6 +21,7 @@ from palpate.cli.table_options import Json
 __all__ = ["simulate_app"]
 
 simulate_app = typer.Typer(
+    cls=CommandGroup,
     help="Doubles of devices, whose hand moves up and down by itself, to try them without hardware.",
     no_args_is_help=True,
 )

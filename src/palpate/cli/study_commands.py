@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.cli.console import Console
-from palpate.errors import AccuracyError, UsageError
+from palpate.cli.verdict_lines import raise_misses, verdict_text
+from palpate.errors import UsageError
 from palpate.format import count, duration
 from palpate.input_files import open_input
 from palpate.processes import CASE_LIMIT
@@ -86,18 +87,21 @@ def sweep_file(
     )
     parts = [data] if further is None else [data, further]
     failed = sum(len(part) - len(part.ok) for part in parts if hasattr(part, "ok"))
-    text = f"{data}\n{target}"
+    what = "solves" if record.memory is None else "histories"
+    failures = f", {failed} did not converge" if failed else ""
+    lines = [str(data)] if console.verbose else []
+    lines.append(f"{target}: {len(data)} {what} to learn from{failures}")
     if further is not None:
-        what = "solves" if record.memory is None else "histories"
-        text += f"\n{other}: {len(further)} further {what} for testing"
+        lines.append(f"{other}: {len(further)} further {what} for testing")
     seconds = [float(s) for part in parts if isinstance(part, Dataset) for s in part["solve_seconds"]]
     if seconds:
-        text += (
-            f"\n{count(len(seconds), 'solve')}, {duration(statistics.median(seconds))} each at the median; "
+        lines.append(
+            f"{count(len(seconds), 'solve')}, {duration(statistics.median(seconds))} each at the median; "
             f"this took {duration(time.monotonic() - began)}"
         )
+    lines.append(f"next    palpate learn {study}")
     content = {"data": str(target), "random": None if further is None else str(other)}
-    console.result(text, content | {"rows": sum(map(len, parts)), "failed": failed})
+    console.result("\n".join(lines), content | {"rows": sum(map(len, parts)), "failed": failed})
 
 
 def learn_path(study: Path, effort: float | None, console: Console, *, watch: bool) -> None:
@@ -174,22 +178,19 @@ def validate_study_file(study: Path, report: bool, console: Console, traces: Seq
     if advice:
         validation = replace(validation, notes=(f"{advice}.", *validation.notes))
     beside = _beside_full_model(record, traces, console)
-    text = "\n".join(filter(None, [solid_words(train), str(validation), *map(str, beside)]))
     if report:
         outcome = Outcome(record, model, train, test, validation, history, comparisons=beside)
         report_study(paths.report, [outcome])
-        text += f"\nreport: {paths.report}"
-    content = validation.as_dict() | {"report": str(paths.report) if report else None, "advice": advice}
+    written = paths.report if report else None
+    then = f"palpate view {paths.model}" if validation.passed else ""
+    text = verdict_text([validation], console, report=written, next_step=then)
+    content = validation.as_dict() | {"report": str(written) if written else None, "advice": advice}
     if beside:
         content["traces"] = [comparison.as_dict() for comparison in beside]
-    console.result(text, content)
-    try:
-        validation.raise_if_failed()
-    except AccuracyError as error:
-        if not advice:
-            raise
-        then = f", then palpate learn {study}" if "--samples" in advice else "."
-        raise AccuracyError(error.what, why=error.why, fix=advice + then) from None
+    lines = [solid_words(train), *(str(c) if console.verbose else c.verdict() for c in beside), text]
+    console.result("\n".join(filter(None, lines)), content)
+    then = f", then palpate learn {study}" if "--samples" in advice else "."
+    raise_misses(validation, console, advice + then if advice else "")
 
 
 def _beside_full_model(record: Study, traces: Sequence[Path], console: Console) -> list[TouchComparison]:
@@ -255,21 +256,19 @@ def validate_model(
     validation = replace(validate(model, data, refined=fine), name=path.stem)
     if touches := correction_count(model.meta):
         validation = replace(validation, notes=(*validation.notes, _CORRECTED.format(touches)))
-    body = solid_words(data)
-    text, target = f"{body}\n{validation}".lstrip(), path.with_suffix(".html") if report else None
+    target = path.with_suffix(".html") if report else None
     if target is not None:
         origin = getattr(data, "provenance", {})
         target = write_report(
             target, [Chapter(path.stem, model, data, validation, settings=model.meta, provenance=origin)]
         )
-        text += f"\nreport: {target}"
-    console.result(text, validation.as_dict() | {"report": str(target) if target else None})
-    try:
-        validation.raise_if_failed()
-    except AccuracyError as error:
-        if not touches:
-            raise
-        raise AccuracyError(error.what, why=error.why, fix=_CORRECTED.format(touches)) from None
+    then = f"palpate view {path}" if validation.passed else ""
+    text = verdict_text([validation], console, report=target, next_step=then)
+    console.result(
+        f"{solid_words(data)}\n{text}".lstrip(),
+        validation.as_dict() | {"report": str(target) if target else None},
+    )
+    raise_misses(validation, console, _CORRECTED.format(touches) if touches else "")
 
 
 def _test_set(path: Path, test: Path | None) -> Any:

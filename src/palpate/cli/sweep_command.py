@@ -10,7 +10,7 @@ import typer
 
 from palpate.cli.console import Console
 from palpate.cli.number_options import count_option, declared_option, number_option
-from palpate.cli.table_options import Json
+from palpate.cli.table_options import Json, Verbose
 from palpate.errors import UsageError
 from palpate.options import ImprovementOptions
 
@@ -69,6 +69,7 @@ def sweep(
         Path | None,
         typer.Option(help="For --scheduler: the key of your certificate, if it has a PEM file of its own."),
     ] = None,
+    verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
     """Solve the finite-element model of a study over its ranges. An interrupted sweep continues where it stopped."""
@@ -91,10 +92,10 @@ def sweep(
             workers=workers,
             case_limit=case_limit,
         )
-        improve_file(study, options, own, Console(as_json))
+        improve_file(study, options, own, Console(as_json, verbose))
         return
     if minutes is not None:
         raise UsageError(
             "A sweep of a design has no limit on time.", fix="Give --until, or leave --minutes out."
         )
-    sweep_file(study, workers, Console(as_json), own, case_limit=case_limit, samples=samples)
+    sweep_file(study, workers, Console(as_json, verbose), own, case_limit=case_limit, samples=samples)

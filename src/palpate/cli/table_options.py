@@ -10,9 +10,20 @@ import typer
 from palpate.cli.number_options import count_option, with_options
 from palpate.errors import UsageError
 
-__all__ = ["Force", "Json", "MissingOption", "column_list", "reading_options", "with_table_options"]
+__all__ = [
+    "Force",
+    "Json",
+    "MissingOption",
+    "Verbose",
+    "column_list",
+    "reading_options",
+    "with_table_options",
+]
 
 Json = Annotated[bool, typer.Option("--json", help="Print the results as one JSON object.")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Print every figure with its limit, and the worst cases.")
+]
 Force = Annotated[
     bool,
     typer.Option(

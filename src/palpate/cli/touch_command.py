@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from palpate.cli.number_options import count_option, declared_option, number_option, with_options
-from palpate.cli.table_options import Json
+from palpate.cli.table_options import Json, Verbose
 from palpate.errors import UsageError
 from palpate.file_kinds import PART_FORMATS
 from palpate.options import ImprovementOptions, PartOptions, StopOptions
@@ -47,13 +47,14 @@ def touch(
     ] = False,
     port: Annotated[int, count_option("--port", least=0, most=65535, help="Of the page.")] = 8080,
     device: Annotated[str, typer.Option(help="Device that presses; see [bold]palpate devices[/].")] = "page",
+    verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
     """Open a part on a page, to be touched while solves and learning improve it. Called again, it goes on."""
     from palpate.cli.console import Console
     from palpate.study.run import Paths
 
-    console = Console(as_json)
+    console = Console(as_json, verbose)
     limit = 60 * minutes
     if sys.stdout.isatty() and not as_json if view is None else view:
         from palpate.cli.touch_page import TouchedPart, touch_on_page
@@ -187,11 +188,12 @@ def _chosen(study: Study) -> str:
 def _carry_on(study: Study, paths: Paths, options: ImprovementOptions, console: Console) -> None:
     """Improve the study, print each surrogate, and write the report of the last."""
     from palpate.cli.improvement_lines import improve_and_print
+    from palpate.cli.verdict_lines import verdict_text
     from palpate.study.run import report_study
 
     outcome, content, failure = improve_and_print(study, paths, options, console)
     report = report_study(paths.report, [outcome])
-    text = f"{outcome.validation}\nreport  {report}\nmodel   {paths.model}   (palpate view {paths.model})"
+    text = verdict_text([outcome.validation], console, report=report, next_step=f"palpate view {paths.model}")
     console.result(text, content | {"report": str(report)})
     if failure is not None:
         raise failure

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Force, Json
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["replay", "trace_app"]
 
 trace_app = typer.Typer(
-    help="Recorded touches: look at them, compare them, export them.", no_args_is_help=True
+    cls=CommandGroup, help="Recorded touches: look at them, compare them, export them.", no_args_is_help=True
 )
 
 TraceFile = Annotated[

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
+from palpate.checks import did_you_mean
 from palpate.devices.crtk import CrtkDevice
 from palpate.devices.device import Device, Sample, Traits
 from palpate.devices.force_dimension import ForceDimensionDevice
@@ -12,6 +13,7 @@ from palpate.devices.gamepad import GamepadDevice
 from palpate.devices.haply import HaplyDevice
 from palpate.devices.openhaptics import OpenHapticsDevice
 from palpate.devices.page import PageDevice
+from palpate.devices.profiles import PROFILES
 from palpate.devices.recorded import RecordedHand
 from palpate.devices.simulated import SimulatedHand
 from palpate.devices.spacemouse import SpaceMouseDevice
@@ -40,6 +42,23 @@ _KINDS: dict[str, _Kind] = {
     "spacemouse": SpaceMouseDevice,
     "crtk": CrtkDevice,
 }
+
+
+WORDS = {
+    **{profile.name: profile.driver for profile in PROFILES.values()},
+    **dict.fromkeys(
+        ("force dimension", "dhd", "omega", "delta", "sigma", "lambda", "novint"), "forcedimension"
+    ),
+    **dict.fromkeys(("3d systems", "touchx", "touch x", "phantom", "geomagic", "sensable"), "openhaptics"),
+    **dict.fromkeys(("inverse", "versegrip"), "haply"),
+    **dict.fromkeys(("joystick", "joypad", "controller", "xbox", "playstation"), "gamepad"),
+    **dict.fromkeys(("3dconnexion", "spacenavigator", "spacenav", "puck"), "spacemouse"),
+    **dict.fromkeys(("ros", "dvrk", "robot"), "crtk"),
+    **dict.fromkeys(("mouse", "browser", "touchscreen"), "page"),
+    **dict.fromkeys(("simulation", "simulator"), "simulated"),
+    **dict.fromkeys(("recording", "replay"), "trace"),
+}
+"""Makers' names of devices and other words, each with the kind of device that is meant."""
 
 
 def device_names() -> tuple[str, ...]:
@@ -99,8 +118,13 @@ def _options(text: str) -> dict[str, str]:
 
 def _kind(name: str) -> _Kind:
     if name not in _KINDS:
+        model = name.strip().lower()
+        meant = did_you_mean(name, _KINDS, meant=WORDS, shown=lambda kind: f"--device {kind}")
+        if model in PROFILES:
+            meant += f" It drives the {model}, and simulated:profile={model} stands for one without hardware."
         raise UsageError(
             f"There is no device {name!r}.",
-            fix=f"Choose one of {', '.join(_KINDS)}; options follow a colon, as in stroke:frequency=1.",
+            why=f"Devices: {', '.join(_KINDS)}; options follow a colon, as in stroke:frequency=1.",
+            fix=meant or "Choose one of these; `palpate devices` says what is there.",
         )
     return _KINDS[name]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, ClassVar, TypeVar
 
+from palpate.checks import did_you_mean
 from palpate.errors import UsageError
 from palpate.units import parse_quantity
 
@@ -88,7 +89,8 @@ def settings_from(kind: type[_Settings], options: Mapping[str, str]) -> _Setting
         if name not in defaults:
             raise UsageError(
                 f"The device has no option {name!r}.",
-                fix=f"Its options are {', '.join(defaults) or 'none'}.",
+                why=f"Its options are {', '.join(defaults) or 'none'}.",
+                fix=did_you_mean(name, defaults) or "Write name=value, with commas between options.",
             )
         is_text = isinstance(defaults[name], str)
         values[name] = text if is_text else parse_quantity(text, "", f"The device option {name}")

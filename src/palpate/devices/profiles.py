@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from palpate.checks import did_you_mean
 from palpate.errors import UsageError
 
 __all__ = ["PROFILES", "DeviceProfile", "device_profile", "limits_in_words", "weakest_profile"]
@@ -75,7 +76,9 @@ def device_profile(name: str) -> DeviceProfile:
         return PROFILES[name.lower()]
     except KeyError as error:
         raise UsageError(
-            f"There is no profile of a device {name!r}.", fix=f"Choose one of {', '.join(PROFILES)}."
+            f"There is no profile of a device {name!r}.",
+            why=f"Profiles: {', '.join(PROFILES)}.",
+            fix=did_you_mean(name, PROFILES) or "Choose one of these.",
         ) from error
 
 

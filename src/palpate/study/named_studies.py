@@ -6,9 +6,9 @@ for less, since it shows the way and not what can be reached.
 
 from __future__ import annotations
 
-import difflib
 from typing import Any
 
+from palpate.checks import did_you_mean
 from palpate.errors import UsageError
 from palpate.physics import Cantilever, Circle, PointLoad
 from palpate.physics.beam.beam_presets import PRESETS, preset
@@ -178,11 +178,10 @@ def preset_study(name: str, *, quick: bool = False) -> Study:
         return Study.model_validate(_quick_memory(name, content) if quick else content)
     if name in PRESETS:
         return _beam(name)
-    close = difflib.get_close_matches(name, preset_names(), n=1)
     raise UsageError(
         f"There is no study called {name!r}.",
         why=f"Known studies: {', '.join(preset_names())}.",
-        fix=f"Did you mean {close[0]!r}?" if close else "Choose one of these, or write a study file.",
+        fix=did_you_mean(name, preset_names(), shown=repr) or "Choose one of these, or write a study file.",
     )
 
 

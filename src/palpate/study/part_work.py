@@ -173,6 +173,7 @@ def _carry_out(
     """Go through the steps, and conclude with the last."""
     from palpate.study.improve_study import conclude
     from palpate.study.run import report_study
+    from palpate.validation.verdict import verdict
 
     last: Any = None
     for step in steps:
@@ -189,7 +190,7 @@ def _carry_out(
         return
     outcome = conclude(study, paths, last)
     report = report_study(paths.report, [outcome])
-    words = str(outcome.validation)
+    words = "\n".join(verdict(outcome.validation))
     say({"ended": {"reached": last.reached, "reason": reason, "report": str(report), "validation": words}})
 
 

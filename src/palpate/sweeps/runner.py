@@ -23,7 +23,7 @@ import numpy as np
 
 from palpate.dataset import Field
 from palpate.errors import ResourceError
-from palpate.processes import end_by_sigterm
+from palpate.processes import end_by_sigterm, note_interrupt
 from palpate.sweeps.case import Columns, Task, failed_rows, solve_chain
 from palpate.sweeps.cluster import LocalCluster, OnDemandCluster, Scheduler, local_cluster
 from palpate.sweeps.problem import Problem
@@ -208,7 +208,7 @@ def _nothing() -> None:
 
 
 _HANDLERS = {
-    signal.SIGINT: (signal.default_int_handler,),
+    signal.SIGINT: (signal.default_int_handler, note_interrupt),
     signal.SIGTERM: (signal.SIG_DFL, end_by_sigterm),
 }
 """Signals that are held back, and the handlers that are replaced: another one is somebody's decision."""

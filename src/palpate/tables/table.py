@@ -13,7 +13,6 @@ What can't be certain is refused, with the line, what stands there and the optio
 from __future__ import annotations
 
 import collections
-import difflib
 import itertools
 import os
 from collections.abc import Mapping, Sequence
@@ -122,11 +121,10 @@ class Table:
                     why="One of them would be taken by chance.",
                     fix="Give each a name of its own.",
                 )
-        near = difflib.get_close_matches(name, self.names, n=1)
         raise UsageError(
             f"{self.path} has no column {name!r}.",
             why=f"Its columns are {', '.join(map(repr, self.names[:_SHOWN]))}{', …' * (len(self.names) > _SHOWN)}.",
-            fix=f"Did you mean {near[0]!r}?" if near else "Choose among these.",
+            fix=checks.did_you_mean(name, self.names, shown=repr) or "Choose among these.",
         )
 
     def numbers(self, name: str) -> np.ndarray:

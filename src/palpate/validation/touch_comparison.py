@@ -84,6 +84,15 @@ class TouchComparison:
             "noticeable": float(np.mean(jnd > 1.0)) if some else 0.0,
         }
 
+    def verdict(self) -> str:
+        """Return in one line how much of the touch a person notices, and the largest difference in newtons."""
+        values = self.as_dict()
+        head = f"{self.names[1]} beside {self.names[0]}"
+        if not values["felt"]:
+            return f"{head}: neither is felt"
+        noticed, largest = share(values["noticeable"]), plain(values["largest_difference"], 3)
+        return f"{head}: a person notices {noticed} of the touch; the largest difference is {largest} N"
+
     def __str__(self) -> str:
         values = self.as_dict()
         head = f"{self.names[1]} beside {self.names[0]}, {len(self.time)} moments"

@@ -29,6 +29,7 @@ from starlette.routing import BaseRoute, Mount
 from starlette.staticfiles import StaticFiles
 
 from palpate.errors import DeviceError, PortInUseError, UsageError
+from palpate.processes import note_interrupt
 from palpate.viewer.guard import LOOPBACK, Guard, Token
 from palpate.viewer.traffic import PatientHttp, PatientWebSocket, Waiting
 
@@ -304,7 +305,7 @@ def _termination_interrupts() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set signal handlers
         return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    before = signal.signal(signal.SIGTERM, note_interrupt)
     try:
         yield
     finally:

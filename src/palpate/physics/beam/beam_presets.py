@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from palpate.checks import did_you_mean
 from palpate.errors import UsageError
 from palpate.physics.beam.beam_loads import Load, LoadAndUnload, PointLoad, StepAndHold, TipLoad
 from palpate.physics.beam.beam_problem import BeamProblem
@@ -152,9 +152,8 @@ def preset(name: str) -> Preset:
     presets = PRESETS | HISTORY_PRESETS
     if name in presets:
         return presets[name]()
-    close = difflib.get_close_matches(name, presets, n=1)
     raise UsageError(
         f"There is no preset called {name!r}.",
         why=f"Known presets: {', '.join(presets)}.",
-        fix=f"Did you mean {close[0]!r}?" if close else "Choose one of these.",
+        fix=did_you_mean(name, presets, shown=repr) or "Choose one of these.",
     )

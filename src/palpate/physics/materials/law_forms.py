@@ -8,13 +8,13 @@ searched by sₚ = ½ μₚ αₚ ≥ 0, the shares of its shear modulus: with n
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from palpate.checks import did_you_mean
 from palpate.errors import UsageError
 from palpate.physics.materials.homogeneous import diagonal, equibiaxial, is_incompressible, planar, uniaxial
 from palpate.physics.materials.material import Material
@@ -148,11 +148,11 @@ def form_of(law: Any) -> LawForm:
     name = {"ogden-1": "ogden", "neo-hooke": "neo-hookean", "mooney": "mooney-rivlin"}.get(name, name)
     if name in FORMS:
         return FORMS[name]
-    near = difflib.get_close_matches(str(law), CANDIDATES, n=1)
     raise UsageError(
         f"No constants of {law!r} can be fitted.",
         why=f"The laws are {', '.join(CANDIDATES)}, and a material of one's own with constants.",
-        fix=f"Did you mean {near[0]!r}?" if near else "Name one of them, or leave it out to have one chosen.",
+        fix=did_you_mean(law, CANDIDATES, shown=repr)
+        or "Name one of them, or leave it out to have one chosen.",
     )
 
 

@@ -8,9 +8,9 @@ and that of adipose tissue in ICRU Report 44 (1989).
 
 from __future__ import annotations
 
-import difflib
 from typing import TypeVar, overload
 
+from palpate.checks import did_you_mean
 from palpate.errors import UsageError
 from palpate.physics.materials.hardening import VoceHardening
 from palpate.physics.materials.linear import LinearElastic
@@ -109,11 +109,9 @@ def named_material(name: str, law: type[Elastic] = Elastic) -> Elastic:
             why=listed,
             fix=f"Take one of these, or {law.__name__} with your own constants.",
         )
-    close = difflib.get_close_matches(key, fitting, n=1)
     raise UsageError(
         f"There is no material called {name!r}.",
         why=listed,
-        fix=f"Did you mean {close[0]!r}?"
-        if close
-        else "Or give its constants, for example LinearElastic(young=70e9, poisson=0.33, density=2700.0).",
+        fix=did_you_mean(key, fitting, shown=repr)
+        or "Or give its constants, for example LinearElastic(young=70e9, poisson=0.33, density=2700.0).",
     )

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable
 from typing import Any
 
+from palpate.checks import did_you_mean
 from palpate.errors import UsageError
 
 __all__ = ["GROUPS", "INTERFACE", "UPRIGHT", "members", "plain_name", "require_known", "require_name"]
@@ -34,11 +34,10 @@ def require_known(kind: str, name: str, known: Iterable[str]) -> None:
     if name in names or (kind == "surface" and members(name, names)):
         return
     groups = [group for group in GROUPS if kind == "surface" and members(group, names)]
-    near = difflib.get_close_matches(str(name), [*names, *groups], n=1, cutoff=0.5)
     raise UsageError(
         f"There is no {kind} {name!r}.",
         why=f"The body's {kind}s are {', '.join(names)}.",
-        fix=f"Did you mean {near[0]!r}?" if near else f"Choose one of these {kind}s.",
+        fix=did_you_mean(name, [*names, *groups], shown=repr, cutoff=0.5) or f"Choose one of these {kind}s.",
     )
 
 

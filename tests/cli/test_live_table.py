@@ -48,7 +48,7 @@ def test_the_table_says_what_the_loop_publishes(touched):
     loop.run_for(0.01, 0.501)
     state = shared.read_state()
     rows = dict(live_rows(state, holds=True))
-    assert rows["device"] == f"simulated: {state.reason}"
+    assert rows["device"] == f"simulated: {state.reason()}"
     assert rows["force"].startswith("0 N")
     assert "1 × stopped; the last one" in rows["faults"]
     assert "keys" not in rows

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.devices.device import Sample, Traits
+from palpate.devices.hand_kind import HandKind
 from palpate.devices.page import PageDevice
 from palpate.devices.simulated import SimulatedHand, SimulatedSettings
 from palpate.devices.tick_record import MAX_INPUTS
@@ -78,7 +79,7 @@ class Bench:
         states = self.ticks(20)
         assert zero(states)
         assert all(state.waiting and state.fault == Fault.NONE for state in states)
-        assert Fault(states[-1].withheld).meaning in states[-1].reason
+        assert Fault(states[-1].withheld).meaning_for(HandKind.DEVICE) in states[-1].reason()
         self.grab()
 
     def settle(self):
@@ -129,7 +130,7 @@ def test_the_hand_feels_the_body(bench):
     np.testing.assert_allclose(bench.device.sent, state.force)
     assert (state.fault, state.faults, state.stalled, state.grabbed) == (0, 0, False, True)
     assert state.tick == 1 + RAMP + 80
-    assert (state.waiting, state.stopped, state.released, state.reason) == (False, False, False, "")
+    assert (state.waiting, state.stopped, state.released, state.reason()) == (False, False, False, "")
     assert state.scale == WORKSPACE.scale
 
 
@@ -151,7 +152,7 @@ def test_a_device_with_motors_starts_without_force_in_the_middle_of_a_body(plain
     states = bench.ticks(100)
     assert zero(states)
     assert states[-1].waiting
-    assert "out of the body" in states[-1].reason
+    assert "out of the body" in states[-1].reason()
     for y in np.arange(-0.03, -0.0025, 0.001):
         handle.sample.position[1] = y
         state = bench.ticks(1)[0]
@@ -188,7 +189,7 @@ def test_a_fault_is_zero_force_a_record_and_a_ramp(bench, plain, fault):
         numbers = [*state.hand, *state.position, *state.contact, *state.loads]
         assert np.isfinite(numbers).all(), "what is published stays finite"
     assert bad[-1].onsets == ((bad[0].time, fault),)
-    assert fault.meaning in bad[-1].reason
+    assert fault.meaning_for(HandKind.DEVICE) in bad[-1].reason()
     MEND[fault](bench, plain)
     bench.come_back()
     good = bench.ticks(RAMP + 30)
@@ -253,7 +254,7 @@ def test_drivers_say_what_became_of_the_device(bench, error, fault):
     bench.device.read_error = error
     state = bench.ticks(3)[-1]
     assert (state.fault, state.words) == (fault, str(error))
-    assert str(error) in state.reason
+    assert str(error) in state.reason()
 
 
 def test_an_impossible_place_is_passed_over_once_and_a_fault_when_it_lasts(bench):
@@ -316,7 +317,7 @@ def test_a_stop_lasts_until_it_is_resumed_and_the_hand_has_left_the_body(bench):
     assert zero(states)
     assert states[-1].stopped
     assert states[-1].fault_counts[Fault.STOPPED] == 1
-    assert "resume" in states[-1].reason
+    assert "resume" in states[-1].reason()
     bench.grab()
     assert zero(bench.ticks(100)), "letting go is no leave to push"
     bench.shared.write_command(stop=True, resume=True)
@@ -348,7 +349,7 @@ def test_with_a_dead_man_button_there_is_force_only_while_it_is_held(plain, hand
     states = bench.ticks(100)
     assert zero(states)
     assert states[-1].released
-    assert "dead-man" in states[-1].reason
+    assert "dead-man" in states[-1].reason()
     handle.sample.buttons = 1
     assert zero(bench.ticks(20)), "pressed in the middle of the body"
     bench.grab()
@@ -527,7 +528,7 @@ def test_whatever_a_driver_says_and_a_body_raises_stays_in_the_loop(bench, plain
     states = bench.ticks(3)
     assert zero(states)
     assert states[-1].fault == Fault.DEVICE_ERROR
-    assert "the bridge complains: ?" in states[-1].reason
+    assert "the bridge complains: ?" in states[-1].reason()
     assert "complains: ?" in bench.loop.device_error
     bench.device.read_error = None
     bench.grab()

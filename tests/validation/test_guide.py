@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from linear_bodies import tip_model
 
+from linear_bodies import tip_model
 from palpate.study import Study
 from palpate.validation import Limits
 from programs import run_program

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from linear_bodies import history, nonsense, plane_data, plane_model, tip_data, tip_model, with_network
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from linear_bodies import history, nonsense, plane_data, plane_model, tip_data, tip_model, with_network
 from palpate.errors import UsageError
 from palpate.validation import Chapter, Limits, validate, write_report
 from palpate.validation.report.style import INK

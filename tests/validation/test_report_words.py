@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from linear_bodies import (
     COMPLIANCE,
     dataset,
@@ -19,7 +20,6 @@ from linear_bodies import (
     tip_model,
     with_network,
 )
-
 from palpate.dataset import Dataset
 from palpate.learning import Settings
 from palpate.surrogates import Surrogate

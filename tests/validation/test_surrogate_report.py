@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from linear_bodies import history, tip_data, tip_model
 
+from linear_bodies import history, tip_data, tip_model
 from models import linear_network
 from palpate.format import bind_units, interval
 from palpate.surrogates import ContactBaseline, ContactLaw, Continuation, LearntEnergy, Surrogate

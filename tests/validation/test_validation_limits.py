@@ -10,6 +10,7 @@ import sys
 
 import numpy as np
 import pytest
+
 from linear_bodies import (
     dataset,
     history,
@@ -20,7 +21,6 @@ from linear_bodies import (
     tip_model,
     with_network,
 )
-
 from palpate.dataset import Dataset
 from palpate.errors import AccuracyError, UsageError
 from palpate.surrogates import Surrogate

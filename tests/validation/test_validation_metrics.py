@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linear_bodies import COMPLIANCE, plane_data, plane_model, tip_data, tip_model
 
+from linear_bodies import COMPLIANCE, plane_data, plane_model, tip_data, tip_model
 from palpate.units import Range
 from palpate.validation import TouchFunction, TouchSolves, Validation, validate
 from palpate.validation.figures.stiffness import curve_slope

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from chromium_page import READ, assert_no, drag, number, open_page, settled, vector
@@ -9,6 +11,7 @@ from playwright.sync_api import Browser, Page
 from slabs import touched_slab
 from test_pressed_page import middle
 
+from palpate.devices.hand_kind import HandKind
 from palpate.runtime.safety import Fault
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
@@ -49,7 +52,7 @@ def test_a_page_too_busy_to_draw_keeps_its_force_and_one_that_hangs_says_why_not
     assert kept
     page.evaluate(BUSY, 2600)
     page.wait_for_function("() => !document.getElementById('reason').hidden")
-    assert Fault.INPUT_STALLED.meaning in page.inner_text("#reason")
+    assert HandKind.PAGE.silence in page.inner_text("#reason")
     assert stalls(viewer) > before
     page.mouse.up()
     settled(page, "free")
@@ -125,6 +128,19 @@ def test_a_device_drives_and_the_page_stops_it(browser: Browser, keep):
         assert felt[1] == pytest.approx(0.5 / 0.0075, rel=0.05)
         assert "200 Hz" in page.inner_text("#feel-words")
         assert page.locator("#depth-wanted").is_hidden()
+        for details in page.locator("details").all():
+            details.evaluate("d => d.open = true")
+        steered = re.compile("finger|mouse|lets? go|take hold|gamepad|space bar", re.IGNORECASE)
+        assert steered.findall(page.inner_text("#panel")) == [], "nobody is told to do what the program does"
+        assert "A program (simulated) moves the hand" in page.inner_text("#flags")
+        page.evaluate(
+            """() => {
+                Object.defineProperty(document, "hidden", {get: () => true, configurable: true});
+                document.dispatchEvent(new Event("visibilitychange"));
+            }"""
+        )
+        assert "The program goes on." in page.inner_text("#flags")
+        page.evaluate("delete document.hidden")
         page.mouse.move(*middle(page))
         page.mouse.down()  # the page doesn't steer: this turns the view
         page.mouse.up()

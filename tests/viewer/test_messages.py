@@ -73,6 +73,7 @@ HELLO = Hello(
     max_force=20.0,
     rate=1000.0,
     faults=("no fault", "a bad number"),
+    hand="page",
     device="",
     meta={"errors": {"rmse": 1e-5}, "seed": 3},
 )

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from palpate.runtime.safety import Fault
+from palpate.devices.hand_kind import HandKind
 from palpate.runtime.stability import FeltStiffness
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
@@ -180,8 +180,8 @@ def test_the_reason_of_a_drop_is_told_with_its_age(viewer: Viewer, rod: Surrogat
         time.sleep(0.4)  # no word: a stall
         client.next_frame()
         told = next(news for news in reversed(client.told) if news["kind"] == "Reason")
-        assert Fault.INPUT_STALLED.meaning in told["now"]
-        assert told["dropped"] == Fault.INPUT_STALLED.meaning
+        assert HandKind.PAGE.silence in told["now"]
+        assert told["dropped"] == HandKind.PAGE.silence
         assert 0.0 <= told["ago"] < 0.4
         client.hand(0.0, 0.0, grabbed=False)
         held(client, y)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from palpate.devices.hand_kind import HandKind
 from palpate.format import length, plain
 from palpate.runtime.safety import Fault
 
@@ -16,14 +17,17 @@ if TYPE_CHECKING:
 __all__ = ["live_rows", "live_table"]
 
 
-def live_rows(state: State, *, holds: bool, keys: bool = False) -> tuple[tuple[str, str], ...]:
+def live_rows(
+    state: State, *, holds: bool, hand: HandKind = HandKind.DEVICE, keys: bool = False
+) -> tuple[tuple[str, str], ...]:
     """Return the table's rows for the newest tick: a name, and figures in words.
 
-    `holds` tells that the device holds the body, and doesn't press it; `keys` that keys of the terminal are heard.
+    `holds` tells that the device holds the body, and doesn't press it; `hand` who moves it; `keys` that keys of the
+    terminal are heard.
     """
     rows = [
         ("loop", _loop(state)),
-        ("device", f"{state.device or 'device'}: {_doing(state)}"),
+        ("device", f"{state.device or 'device'}: {_doing(state, hand)}"),
         ("force", f"{plain(math.hypot(*state.force), 3)} N, at most {plain(state.max_force, 3)} N"),
         ("displaced" if holds else "depth", _depth(state, holds=holds)),
         ("energy", f"{_millijoules(state.energy)}, lowest {_millijoules(state.energy_lowest)}"),
@@ -36,16 +40,16 @@ def live_rows(state: State, *, holds: bool, keys: bool = False) -> tuple[tuple[s
     return tuple(rows)
 
 
-def live_table(state: State, *, holds: bool, keys: bool = False) -> Table:
-    """Return the rows as a table for a terminal; the parameters are those of `live_rows`."""
+def live_table(state: State, **options: Any) -> Table:
+    """Return the rows as a table for a terminal; the options are those of `live_rows`."""
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
-    for name, words in live_rows(state, holds=holds, keys=keys):
-        alarm = name == "device" and bool(state.reason)
+    for name, words in live_rows(state, **options):
+        alarm = name == "device" and bool(state.reason())
         table.add_row(name, Text(words, style="bold red" if alarm else ""))
     return table
 
@@ -58,9 +62,9 @@ def _loop(state: State) -> str:
     return f"{rate}, of {state.nominal_rate:.0f} Hz; {late}"
 
 
-def _doing(state: State) -> str:
-    if state.reason:
-        return state.reason
+def _doing(state: State, hand: HandKind) -> str:
+    if reason := state.reason(hand):
+        return reason
     if not state.grabbed:
         return "no hand"
     return "pushing" if state.force.any() else "touching nothing"

@@ -13,7 +13,7 @@ from pathlib import Path
 from palpate.cli.console import Console
 from palpate.cli.live_table import live_table
 from palpate.cli.terminal_keys import RESUME, STOP, Keys, terminal_keys
-from palpate.devices import device_traits
+from palpate.devices import device_traits, hand_kind
 from palpate.format import duration, share
 from palpate.runtime import LoopProcess
 from palpate.runtime.shared_state import State
@@ -170,9 +170,10 @@ def _shown(
     from rich.console import Console as Rich
     from rich.live import Live
 
-    first = live_table(loop.read(), holds=holds, keys=keys.heard)
+    options = {"holds": holds, "hand": hand_kind(loop.device), "keys": keys.heard}
+    first = live_table(loop.read(), **options)
     with Live(first, console=Rich(stderr=True), refresh_per_second=_REFRESH) as live:
-        yield lambda state: live.update(live_table(state, holds=holds, keys=keys.heard))
+        yield lambda state: live.update(live_table(state, **options))
 
 
 def _wait(

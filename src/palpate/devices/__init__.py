@@ -10,6 +10,7 @@ from palpate.devices.crtk import CrtkDevice
 from palpate.devices.device import Device, Sample, Traits
 from palpate.devices.force_dimension import ForceDimensionDevice
 from palpate.devices.gamepad import GamepadDevice
+from palpate.devices.hand_kind import HandKind
 from palpate.devices.haply import HaplyDevice
 from palpate.devices.openhaptics import OpenHapticsDevice
 from palpate.devices.page import PageDevice
@@ -21,10 +22,12 @@ from palpate.devices.stroke import StrokeDevice
 from palpate.errors import UsageError
 from palpate.network.shared_memory import Block
 
-__all__ = ["Device", "Sample", "Traits", "device_named", "device_names", "device_traits"]
+__all__ = ["Device", "Sample", "Traits", "device_named", "device_names", "device_traits", "hand_kind"]
 
 
 class _Kind(Protocol):
+    @property
+    def hand(self) -> HandKind: ...
     @property
     def traits(self) -> Traits: ...
     def open(self, commands: Block, options: Mapping[str, str]) -> Device: ...
@@ -78,6 +81,17 @@ def device_traits(device: str) -> Traits:
     kind = _kind(name)
     by_options = getattr(kind, "traits_of", None)  # of a device whose file or settings say more than its kind
     return kind.traits if by_options is None else by_options(_options(text))
+
+
+def hand_kind(device: str) -> HandKind:
+    """Return who moves the hand of a device, by ``name`` or ``name:options``.
+
+    Raises
+    ------
+    UsageError
+        If there is no device of that name.
+    """
+    return _kind(device.partition(":")[0]).hand
 
 
 def device_named(device: str, commands: Block) -> Device:

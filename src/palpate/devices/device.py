@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 
 from palpate.devices.device_options import settings_from
+from palpate.devices.hand_kind import HandKind
 from palpate.devices.profiles import DeviceProfile
 from palpate.errors import DeviceError
 from palpate.network.shared_memory import Block
@@ -184,11 +185,12 @@ class Device(Protocol):
 class Driver:
     """The common part of drivers: opened from texts, used until they are closed, and given finite forces.
 
-    A kind has the dataclass of its options, `settings_kind`, and what messages call it, `called`.
+    A kind has the dataclass of its options, `settings_kind`, what messages call it, `called`, and who moves its `hand`.
     """
 
     settings_kind: ClassVar[type]
     called: ClassVar[str] = "device"
+    hand: ClassVar[HandKind] = HandKind.DEVICE
     traits: Traits
     name = ""  # what an opened device calls itself
     closed = False
@@ -232,6 +234,8 @@ class Driver:
 
 class ScriptedHand(Driver):
     """A hand that no force moves; `sent` (3,) keeps the latest force, N."""
+
+    hand = HandKind.PROGRAM
 
     def __init__(self) -> None:
         self.sent, self.sample = np.zeros(3), Sample()

@@ -20,6 +20,7 @@ import numpy as np
 
 from palpate.devices.device import Driver, Sample, Traits
 from palpate.devices.device_options import settings_from
+from palpate.devices.hand_kind import HandKind
 from palpate.network.shared_memory import Block
 
 __all__ = ["FrameInterpolator", "PageDevice", "page_patience"]
@@ -80,6 +81,7 @@ class _NoSettings:
 class PageDevice(Driver):
     """Steered through the command block; the force leaves through the state block."""
 
+    hand = HandKind.PAGE
     traits = Traits(0.075, 20.0, None, "no motor; the limit on the drawn force is delta.3's")
 
     def __init__(self, commands: Block) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from palpate.devices.device import Sample, ScriptedHand, Traits
 from palpate.devices.device_options import DeviceOptions, number, settings_from, switch, word
+from palpate.devices.hand_kind import HandKind
 from palpate.devices.trace_file import read_stroke
 
 __all__ = ["RecordedHand", "RecordedSettings"]
@@ -33,6 +34,7 @@ class RecordedHand(ScriptedHand):
     """Moves as a recorded hand did. `sent` keeps the latest force, N."""
 
     settings_kind = RecordedSettings
+    hand = HandKind.RECORDING
     traits = Traits(0.075, 20.0, None, "a recorded hand, which no force moves")
 
     def __init__(self, settings: RecordedSettings) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from palpate.devices.device import Driver, Sample, Traits
 from palpate.devices.device_options import DeviceOptions, number, word
+from palpate.devices.hand_kind import HandKind
 from palpate.devices.profiles import device_profile
 from palpate.devices.trace_file import read_stroke
 from palpate.kernels import kernel, part
@@ -82,6 +83,7 @@ class SimulatedHand(Driver):
     """
 
     settings_kind = SimulatedSettings
+    hand = HandKind.PROGRAM
     traits = Traits(
         0.075, 12.0, 0.5, "a simulation; radius and force limit are omega.3's", mass=0.2, stamped=True
     )

@@ -25,6 +25,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from palpate.devices.hand_kind import HandKind
 from palpate.errors import UsageError
 
 __all__ = ["Fault", "Limits", "PlaceCheck", "Safety", "Stop", "stalled"]
@@ -56,12 +57,16 @@ class Fault(IntEnum):
         """The fault in words, one line for people."""
         return _MEANINGS[self]
 
+    def meaning_for(self, hand: HandKind) -> str:
+        """Return the fault in words for whoever moves the hand."""
+        return hand.silence if self is Fault.INPUT_STALLED else self.meaning
+
 
 _MEANINGS = {
     Fault.NONE: "no fault",
     Fault.INPUT_NOT_FINITE: "the device reported a position that is not a finite number",
     Fault.OUTPUT_NOT_FINITE: "the model answered with a number that is not finite",
-    Fault.INPUT_STALLED: "the input is older than its device allows, or the page is hidden",
+    Fault.INPUT_STALLED: "nothing was heard of the hand for longer than it may be silent",
     Fault.CLOCK_JUMP: "the clock jumped, or the process was suspended",
     Fault.DEVICE_ERROR: "the device driver reported an error",
     Fault.EVALUATOR_ERROR: "the model could not be evaluated",

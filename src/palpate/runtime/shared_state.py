@@ -18,6 +18,7 @@ from typing import Annotated, Any, Self, TypeAlias, get_origin, get_type_hints
 
 import numpy as np
 
+from palpate.devices.hand_kind import HandKind
 from palpate.devices.tick_record import LEDGER, MAX_INPUTS
 from palpate.errors import DeviceError, UsageError
 from palpate.network import shared_memory
@@ -188,23 +189,22 @@ class State:
             (float(self.onset_times[k % ONSETS]), Fault(self.onset_kinds[k % ONSETS])) for k in latest
         )
 
-    @property
-    def reason(self) -> str:
-        """Why there is no force now, and what brings it back, in words; empty where it may flow."""
+    def reason(self, hand: HandKind = HandKind.DEVICE) -> str:
+        """Return why there is no force now, and what brings it back, for a kind of hand; empty where it may flow."""
         fault = Fault(self.fault)
         if self.stopped:
             since = f" since {fault.meaning}" if (fault := Fault(self.withheld)) is Fault.UNSTABLE else ""
             return f"Stopped{since}: the force stays zero until you resume."
         if fault is not Fault.NONE:
             said = f" ({self.words})" if self.words and fault in _DRIVER else ""
-            return f"No force: {fault.meaning}{said}."
+            return f"No force: {fault.meaning_for(hand)}{said}."
         if self.released:
             return "No force: the dead-man button is not held."
         if not self.waiting:
             return ""
         after = Fault(self.withheld)
-        since = f" since {after.meaning}" if after is not Fault.NONE else ""
-        return f"No force yet{since}: move the hand out of the body, or bring what it holds back to rest."
+        since = f" since {after.meaning_for(hand)}" if after is not Fault.NONE else ""
+        return f"No force yet{since}: {hand.way_back}"
 
     @property
     def lateness_p50(self) -> float:

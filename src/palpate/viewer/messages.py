@@ -294,7 +294,8 @@ class Hello(Json):
     max_force: float  # the force limit, N
     rate: float  # Hz, what the loop aims at
     faults: tuple[str, ...]  # words for fault codes, by code
-    device: str  # what it calls itself that the hand holds; empty where the page's own hand touches the body
+    hand: str  # who moves the hand: ``page``, ``device``, ``recording`` or ``program``
+    device: str  # the hand's name in words; empty where the page's own hand touches the body
     meta: Mapping[str, Any]  # what the model's file says of its making
 
 

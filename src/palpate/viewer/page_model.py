@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from palpate.devices.hand_kind import HandKind
 from palpate.format import summary_figure
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
@@ -88,10 +89,12 @@ class PageModel:
         assert isinstance(self._drawing, SurfaceDrawing)
         return trust_map(self._drawing)
 
-    def hello(self, state: HandSettings, rate: float, device: str = "") -> Hello:
+    def hello(
+        self, state: HandSettings, rate: float, hand: HandKind = HandKind.PAGE, device: str = ""
+    ) -> Hello:
         """Return what every page is told first; `rate` is that of the loop in Hz.
 
-        `device` names the device that the hand holds; it is empty where it is a page's own.
+        `hand` says who moves the hand, and `device` names it in words; those are empty where it is a page's own.
         """
         body = self.body
         return Hello(
@@ -114,7 +117,8 @@ class PageModel:
             workspace=state.radius,
             max_force=state.max_force,
             rate=rate,
-            faults=tuple(f.meaning for f in Fault),
+            faults=tuple(fault.meaning_for(hand) for fault in Fault),
+            hand=hand,
             device=device,
             meta=_in_words(body.meta),
         )

@@ -32,6 +32,7 @@ from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from palpate.devices import hand_kind
 from palpate.errors import PalpateError, UsageError
 from palpate.runtime import LoopProcess
 from palpate.runtime.touchable import load_touchable
@@ -48,7 +49,7 @@ from palpate.viewer.part_messages import (
     StartWish,
     UnitWish,
 )
-from palpate.viewer.server import body_routes, driver_in_words
+from palpate.viewer.server import body_routes
 from palpate.viewer.session import Session
 from palpate.viewer.shown_part import PartChoices, ShownPart, choices_of
 from palpate.viewer.solve_dots import on_surface
@@ -234,8 +235,8 @@ class PartPage(LocalServer):
     def _open(self, model: PageModel, path: str | os.PathLike[str]) -> None:
         """Start the real-time process, and a session for its pages."""
         self.loop = self._closing.enter_context(LoopProcess(path, device=self._device))
-        driver = driver_in_words(self._device)
-        self._session = Session(model, self.loop, recordings=self._recordings, device=driver)
+        hand = hand_kind(self._device)
+        self._session = Session(model, self.loop, hand, self._device, recordings=self._recordings)
         self._do(self._watch(self._session))
 
     async def _watch(self, session: Session) -> None:

@@ -23,6 +23,8 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
+from palpate.devices import hand_kind
+from palpate.devices.hand_kind import HandKind
 from palpate.files import TemporaryFolder
 from palpate.runtime import LoopProcess
 from palpate.runtime.touchable import load_touchable, touchable
@@ -33,7 +35,7 @@ from palpate.viewer.session import Session
 from palpate.viewer.web_server import LocalServer, ServerOptions, local_application, wait_until_interrupted
 from palpate.viewer.wire import Binary
 
-__all__ = ["Viewer", "ViewerOptions", "application", "body_routes", "driver_in_words", "serve"]
+__all__ = ["Viewer", "ViewerOptions", "application", "body_routes", "serve"]
 
 
 def application(session: Session) -> Starlette:
@@ -96,12 +98,6 @@ def body_routes(session: Callable[[], Session | None]) -> list[BaseRoute]:
         Route("/trust", trust),
         Route("/fields/{index:int}", modes),
     ]
-
-
-def driver_in_words(device: str) -> str:
-    """Return the device that holds the hand, in words; empty for a page's own hand."""
-    name = device.partition(":")[0]
-    return "" if name == "page" else f"the device {name}"
 
 
 class ViewerOptions(ServerOptions, total=False):
@@ -194,7 +190,8 @@ class Viewer(LocalServer):
             controller=controller,
             dead_man=dead_man,
         )
-        self._driver = "a recorded touch" if replay is not None else driver_in_words(device)
+        self._hand = HandKind.RECORDING if replay is not None else hand_kind(device)
+        self._device = device
         self._recordings = Path(recordings) if replay is None else None
 
     @property
@@ -205,7 +202,7 @@ class Viewer(LocalServer):
     def _application(self) -> Starlette:
         self.loop = self._closing.enter_context(self._loop(self._file()))
         return application(
-            Session(PageModel(self.model), self.loop, recordings=self._recordings, device=self._driver)
+            Session(PageModel(self.model), self.loop, self._hand, self._device, recordings=self._recordings)
         )
 
     def _file(self) -> str | os.PathLike[str]:

@@ -21,6 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from palpate.devices.hand_kind import HandKind
 from palpate.errors import DeviceError, UsageError
 from palpate.runtime.loop_report import EDGES
 from palpate.runtime.safety import Fault
@@ -123,19 +124,21 @@ class Page:
 class Session:
     """A body, its real-time process and the pages that look at it.
 
-    `clock` gives the time in s for the pages' shares. Nothing is recorded without a folder for `recordings`. `device`
-    is the device that the hand holds, in words, where it has no name of its own; empty where pages steer the hand.
+    `hand` says who moves the hand, and `device` names the device, as in ``haply``. `clock` gives the time in s for the
+    pages' shares. Nothing is recorded without a folder for `recordings`.
     """
 
     def __init__(
         self,
         model: PageModel,
         loop: LoopLike,
+        hand: HandKind = HandKind.PAGE,
+        device: str = "page",
         clock: Callable[[], float] = time.perf_counter,
         recordings: Path | None = None,
-        device: str = "",
     ) -> None:
         self.model, self.loop, self._clock = model, loop, clock
+        self._hand, self._device = hand, device.partition(":")[0]
         self._lock = HandLock(np.array([(r.low + r.high) / 2 for r in model.body.parameters]))
         self._pages: dict[int, Page] = {}
         self._numbers: Iterator[int] = itertools.count(1)
@@ -146,7 +149,6 @@ class Session:
             recordable: Any = loop
             self._recording = PageRecording(recordable, recordings, model.body.name, self._tell_all)
         self._models = {model.version: model}
-        self._device = device
         self._wishes: set[asyncio.Task[None]] = set()
         self._state = loop.shared.read_state()
 
@@ -189,7 +191,8 @@ class Session:
     def hello(self) -> Hello:
         """Return the first message to every page."""
         state = self._read()[0]
-        return self.model.hello(state, self.loop.rate, self._device and (state.device or self._device))
+        named = state.device if self._hand is HandKind.DEVICE else ""
+        return self.model.hello(state, self.loop.rate, self._hand, named or self._hand.holder(self._device))
 
     def frame(self, page: Page) -> Frame:
         """Return the newest state as one page sees it."""
@@ -264,16 +267,14 @@ class Session:
     def _news(self, page: Page) -> list[Reason | Feel]:
         """Return what has changed since the page was told last: why there is no force, whether the body is softened."""
         state, news = self._state, list[Reason | Feel]()
-        words = state.reason
-        if state.waiting and not state.stopped and not state.fault and not self._device:
-            words = f"{words} Let go, and take hold again."
+        words = state.reason(self._hand)
         reason = (words, state.stopped, state.faults)
         if reason != page.reason:
             page.reason = reason
             # a stop needs no explaining
             drops = [drop for drop in state.onsets if drop[1] is not Fault.STOPPED]
             at, fault = drops[-1] if drops else (now(), Fault.NONE)
-            dropped = fault.meaning if drops else ""
+            dropped = fault.meaning_for(self._hand) if drops else ""
             news.append(Reason(words, state.stopped, dropped, max(0.0, now() - at)))
         if (feel := softening(state.felt_stiffness)) != page.feel:
             page.feel = feel
@@ -306,7 +307,7 @@ class Session:
             page.model = self.version(Ready.unpack(data).version) or page.model
             return
         hand = Hand.unpack(data)
-        if self._device and hand.grabbed:  # the hand is not the page's
+        if self._hand is not HandKind.PAGE and hand.grabbed:  # the hand is not the page's
             hand = replace(hand, grabbed=False)
         page.echo = hand.sent
         if (command := self._lock.hear(page.number, hand, now())) is not None:

@@ -1,14 +1,14 @@
 // Words of a page: flags for all that is out of the ordinary, the banner, the status.
 
+import { free } from "./hand_words";
 import { Hold, Loop } from "./messages";
 import type { Frame, Hello, Notice } from "./messages";
-import { element, tidy } from "./units";
+import { capital, element, tidy } from "./units";
 
 const SLOW = 0.9; // of the rate aimed at
 
 /** Words of a kind of body for where the hand is. */
 export interface Places {
-  free: string;
   inside: string;
   outside: string;
 }
@@ -24,7 +24,7 @@ export function flags(frame: Frame, hello: Hello, places: Places): Flag[] {
   const list = [...failures(frame, hello), ...limits(frame, hello, places)];
   if (list.length === 0) list.push(ordinary(frame, places));
   if (hello.device) {
-    list.push({ id: "device", tone: "calm", words: `The hand is that of ${hello.device}; the page shows it.` });
+    list.push({ id: "device", tone: "calm", words: `${capital(hello.device)} moves the hand; the page shows it.` });
   } else if (frame.hold === Hold.ANOTHER) {
     list.push({ id: "watching", tone: "calm", words: "Another page holds the hand; this one watches." });
   }
@@ -73,7 +73,7 @@ function limits(frame: Frame, hello: Hello, places: Places): Flag[] {
 }
 
 function ordinary(frame: Frame, places: Places): Flag {
-  if (!frame.grabbed) return { id: "free", tone: "calm", words: places.free };
+  if (!frame.grabbed) return { id: "free", tone: "calm", words: free() };
   return { id: "inside", tone: "good", words: places.inside };
 }
 

@@ -4,6 +4,7 @@
 import type { Vector2, Vector3 } from "three";
 import type { Link } from "./connection";
 import type { Pad } from "./gamepad";
+import { use } from "./hand_words";
 import type { Hello, Vec3 } from "./messages";
 
 const BEAT = 50; // ms between heartbeats
@@ -35,7 +36,10 @@ export abstract class Hand {
     setInterval(() => performance.now() - this.lastSent > 0.9 * BEAT && this.send(), BEAT);
     if (hello.device) return; // a device holds the hand
     // registered before the view's own handlers, so that a grab can keep the view still
-    canvas.addEventListener("pointerdown", (e) => this.down(e));
+    canvas.addEventListener("pointerdown", (e) => {
+      use(e.pointerType);
+      this.down(e);
+    });
     canvas.addEventListener("pointermove", (e) => this.move(e));
     for (const kind of ["pointerup", "pointercancel", "lostpointercapture"] as const) {
       canvas.addEventListener(kind, (e) => e.pointerId === this.pointer && this.release());
@@ -59,6 +63,7 @@ export abstract class Hand {
   /** Follow a gamepad (null: there is none), `elapsed` ms after the picture before. */
   drive(pad: Pad | null, elapsed: number): void {
     if (this.hello.device || this.pointer !== null || (this.grabbed && !this.padded)) return;
+    if (pad && (pad.hold || pad.trigger)) use("gamepad");
     if (pad) this.follow(pad, elapsed);
     else if (this.padded) this.release();
   }

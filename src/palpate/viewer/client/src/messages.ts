@@ -96,6 +96,7 @@ export interface Hello {
   max_force: number;
   rate: number;
   faults: string[];
+  hand: string;
   device: string;
   meta: Record<string, unknown>;
 }

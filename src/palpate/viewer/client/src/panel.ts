@@ -2,6 +2,7 @@
 
 import { about } from "./about";
 import { flags } from "./flags";
+import { away, moves } from "./hand_words";
 import type { Flag, Places } from "./flags";
 import { Hold, Loop } from "./messages";
 import type { Frame, Hello, RangeInfo } from "./messages";
@@ -15,20 +16,12 @@ const NUMBERS = ["force-norm", "force-x", "force-y", "force-z", "tip-x", "tip-y"
 const UNKNOWN = [...NUMBERS, "depth", "stiffness", "rate", "picture-rate"];
 
 const PULLING: Places = {
-  free: "Nobody holds the body. Drag what is held.",
   inside: "Within what it was trained on.",
   outside: "Outside the trained range: nothing vouches for the force.",
 };
 const PRESSING: Places = {
-  free: "Nobody presses. Hold the mouse button, a finger or the space bar on the body.",
   inside: "Inside what the surrogate was trained on.",
   outside: "Outside the trained region: the energy is continued, and nothing vouches for the force.",
-};
-
-const DRIVEN: Places = {
-  free: "The device lets the body alone.",
-  inside: PRESSING.inside,
-  outside: PRESSING.outside,
 };
 
 export interface Wishes {
@@ -59,7 +52,7 @@ export class Panel {
     this.hello = hello;
     element("model-name").textContent = hello.name;
     element("model-line").replaceChildren(...subtitle(hello), hello.remembers ? `; ${hello.remembers}` : "");
-    document.documentElement.toggleAttribute("data-driven", hello.device !== "");
+    moves(hello);
     document.title = `${hello.name} · palpate`;
     sliders(hello.parameters, (i, value) => wishes.moved(i, value));
     const [first, most] = Panel.depths(hello);
@@ -112,7 +105,7 @@ export class Panel {
     this.last = now;
     this.numbers(frame);
     this.timing.show(frame, now);
-    this.list(flags(frame, hello, hello.device ? DRIVEN : hello.holds ? PULLING : PRESSING));
+    this.list(flags(frame, hello, hello.holds ? PULLING : PRESSING));
     follow(frame);
     const peak = round125(Math.max(this.force.peak(frame.time), 0.05 * hello.force_max, 1e-9));
     this.force.draw(frame.time, { unit: "N", low: 0, high: peak, logarithmic: false, stepped: false });
@@ -120,7 +113,7 @@ export class Panel {
 
   /** The tab went to the background. */
   hidden(): void {
-    this.list([{ id: "hidden", tone: "warn", words: "This tab is in the background: the hand has let go." }]);
+    this.list([{ id: "hidden", tone: "warn", words: away() }]);
   }
 
   /** Nothing is known any more. */

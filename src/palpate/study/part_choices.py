@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from palpate.errors import UsageError
-from palpate.format import millimetres, pressure
+from palpate.format import millimetres
 from palpate.physics import ImportedMesh, named_material
-from palpate.physics.materials.library import MATERIALS
+from palpate.physics.materials.library import MATERIALS, material_words
 from palpate.physics.shapes.body_file import UNITS, apply_patches
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.naming import members
@@ -63,7 +63,7 @@ def shown_part(study: Study) -> ShownPart:
         ),
         units=tuple(UNITS) if body.unit else (),
         whole=bool(getattr(bare, "is_cad", False)),
-        materials={name: _about(name) for name in MATERIALS if _is_for_solids(name)},
+        materials={name: material_words(name) for name in MATERIALS if _is_for_solids(name)},
         laws=LAWS,
         notes=tuple(bare.notes),
     )
@@ -232,9 +232,3 @@ def _material(body: PartRecord, choices: PartChoices) -> Any:
 def _is_for_solids(name: str) -> bool:
     """Return whether a material of the library can be that of a solid that is learnt from rest."""
     return not hasattr(named_material(name), "hardening")
-
-
-def _about(name: str) -> str:
-    material = named_material(name)
-    young = 2 * material.shear_modulus * (1 + material.poisson)
-    return f"{type(material).__name__}, Young's modulus {pressure(young)} at small strains"

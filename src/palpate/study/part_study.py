@@ -22,7 +22,7 @@ from palpate.study.part_records import PartRecord, part_shape
 from palpate.study.study import Study
 from palpate.study.toml import to_toml
 
-__all__ = ["part_study", "part_text", "study_file"]
+__all__ = ["part_study", "part_text", "study_file", "study_name"]
 
 HELD, TOUCHED = "held", "touched"
 YOUNG, POISSON = 10e3, 0.45  # Pa; of soft tissue, until the user says what it is

@@ -381,6 +381,11 @@ class PartOptions(Options):
     unit: str | None = option(
         None, "unit of the file's numbers. Default: mm, or m where only that fits; else it is asked"
     )
+    material: str | None = option(
+        None,
+        "tissue or other material by name, such as liver, muscle or 'ecoflex 00-30'. Default: an own one",
+        flag="--material --tissue",
+    )
     young: float | None = option(None, "Young's modulus. Default: 10 kPa", "Pa", bare=False)
     poisson: float | None = option(None, "Poisson's ratio. Default: 0.45")
     radius: float | None = option(
@@ -393,3 +398,4 @@ class PartOptions(Options):
         (), "surface of the file that is held. Several times. Default: what it stands on"
     )
     touched: str | None = option(None, "surface of the file that is touched. Default: what faces up")
+    name: str | None = option(None, "name of the study and of its files. Default: that of the part")

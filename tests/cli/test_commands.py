@@ -89,12 +89,18 @@ def test_only_a_toml_file_is_a_target_of_init(palpate, tmp_path, name):
     assert path.read_bytes() == b"mine"
 
 
+FIELD = Path(__file__).parents[1] / "data" / "field"
+
+
 def test_a_sample_that_does_not_exist_says_which_do(palpate, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    answer = palpate("init", "--sample", "liver.stl")
+    answer = palpate("init", "--sample", "livr.stl")
     assert answer.code == 2
-    assert "kidney.stl" in answer.err
-    assert palpate("init", "--sample").code == 0
+    assert "kidney, liver, heart, prostate" in answer.err
+    assert "Did you mean liver?" in answer.err
+    answer = palpate("init", "--sample")
+    assert answer.code == 0
+    assert "palpate touch kidney.stl" in answer.out
     assert palpate("init", "--sample", "kidney").code == 2
     assert palpate("init", "--sample", "kidney", "--force").code == 0
     Path("kidney.stl").write_bytes(b"a scan")
@@ -102,7 +108,41 @@ def test_a_sample_that_does_not_exist_says_which_do(palpate, tmp_path, monkeypat
     assert Path("kidney.stl").read_bytes() == b"a scan"
 
 
-FIELD = Path(__file__).parents[1] / "data" / "field"
+def test_a_parts_study_takes_its_options_and_another_name(palpate, tmp_path):
+    part = Path(shutil.copy(FIELD / "surface" / "quad_cube.obj", tmp_path / "cube.obj"))
+    answer = palpate(
+        "init", part, "--young", "4 kPa", "--poisson", "0.4", "--depth", "2 mm", "--name", "soft"
+    )
+    assert answer.code == 0
+    assert f"palpate touch {part} --name soft" in answer.out
+    assert not (tmp_path / "cube.toml").exists()
+    study = read_study(tmp_path / "soft.toml")
+    assert (study.name, study.body.material.young, study.body.material.poisson) == ("soft", 4e3, 0.4)
+    assert study.interaction.depth[1] == pytest.approx(2e-3)
+    assert palpate("init", part, "--name", "soft").code == 2
+    assert palpate("init", part, "--tissue", "liver").code == 0
+    assert read_study(tmp_path / "cube.toml").body.material == "liver"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("cube.obj", "mystudy.txt"), "palpate init cube.obj --name mystudy"),
+        (("one.toml", "two.toml"), "two.toml is one file too many"),
+        (("cube.obj", "--name", "a/b"), "Its files are named after it"),
+        (("cube.obj", "--material", "liver", "--young", "4 kPa"), "of its own"),
+        (("cube.obj", "--tissue", "livr"), "'liver'"),
+        (("cube.obj", "--preset", "block"), "Leave out --preset"),
+        (("one.toml", "--depth", "2 mm"), "--depth belongs to a part"),
+    ],
+)
+def test_what_init_can_not_do_it_says(palpate, tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(FIELD / "surface" / "quad_cube.obj", "cube.obj")
+    answer = palpate("init", *arguments)
+    assert answer.code == 2
+    assert words in answer.err
+    assert [path.name for path in Path().iterdir()] == ["cube.obj"], "nothing is written"
 
 
 def test_a_scan_gets_its_study_beside_it_and_stays_as_it_is(palpate, tmp_path):

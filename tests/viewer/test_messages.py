@@ -90,7 +90,7 @@ FACTS = PartFacts(
     size=(0.11, 0.06, 0.04),
     faces=(FaceInfo("face 1", 1e-3, (0.0, 0.5, 1.0)),),
     whole=False,
-    materials=(MaterialInfo("fat", "soft"),),
+    materials=(MaterialInfo("fat", "soft", "tissue", "3.3 kPa", "0.45"),),
     laws=("neo-hookean",),
     choices=dataclasses.asdict(WISH),
     notes=("repaired",),
@@ -101,7 +101,7 @@ PART = (
     FACTS,
     WISH,
     UnitWish("m"),
-    Answer("no"),
+    Answer("no", {"depth": "too deep"}),
     LEARNING,
 )
 WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"), NEWS, REASON, FEEL, *PART)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 from collections.abc import Iterator
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import trimesh
@@ -76,15 +78,32 @@ def problem(page: Page) -> str:
     return page.inner_text("#problem")
 
 
+def misfit(page: Page, field: str) -> str:
+    """The sentence beside a field, of which there is one."""
+    page.wait_for_selector(f"#{field}[aria-invalid=true]")
+    return page.inner_text(f"#{field}-misfit")
+
+
+def middle(page: Page) -> tuple[float, float]:
+    """The middle of the picture, where the upper face is."""
+    box = page.locator("#part-view").bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def ready(page: Page, server: PartPage, study: Study) -> None:
+    """Show the part, and wait until it can be set up."""
+    page.wait_for_selector("html[data-stage=reading]")
+    server.show_part(shown_part(study))
+    page.wait_for_selector("html[data-partdrawn][data-picked]")
+
+
 def picked(page: Page) -> tuple[int, int]:
     held, touched = page.evaluate("document.documentElement.dataset.picked").split()
     return int(held), int(touched)
 
 
 def test_a_part_is_set_up_by_picks_and_texts(server, page, study, chosen, keep):
-    page.wait_for_selector("html[data-stage=reading]")
-    server.show_part(shown_part(study))
-    page.wait_for_selector("html[data-partdrawn][data-picked]")
+    ready(page, server, study)
     assert picked(page) == (2, 2), "at first it stands on its underside, and is touched above"
     assert "40 × 30 × 20 mm" in page.inner_text("#part-facts")
     for unit, size in (("cm", "400 × 300 × 200 mm"), ("mm", "40 × 30 × 20 mm")):
@@ -93,24 +112,24 @@ def test_a_part_is_set_up_by_picks_and_texts(server, page, study, chosen, keep):
     page.wait_for_selector("html[data-partdrawn][data-picked]")
 
     begin(page, young="4")
-    assert "Young's modulus: '4' has no unit" in problem(page)
+    assert "Young's modulus: '4' has no unit" in misfit(page, "young")
     begin(page, young="4 kPa", ball_depth="25 mm")
-    assert "The depth of 25 mm is more than the part is thick, 20 mm." in problem(page)
+    assert "The depth of 25 mm is more than the part is thick, 20 mm." in misfit(page, "ball-depth")
     begin(page, ball_depth="2 mm", poisson="0.6")
-    assert "poisson" in problem(page).lower()
+    assert "out of range" in misfit(page, "poisson")
     page.fill("#poisson", "0.4")
 
-    box = page.locator("#part-view").bounding_box()
-    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    page.click("[data-role='2']")
-    page.mouse.click(*middle)  # the upper face is given back
+    page.click("#roles [data-role='0']")
+    page.mouse.click(*middle(page))  # the upper face is given back
     assert picked(page) == (2, 0)
     begin(page)
     assert problem(page).startswith("Nothing is touched.")
+    page.click("#roles [data-role='2']")
     page.click("[data-tool=brush]")
-    page.mouse.move(*middle)
+    x, y = middle(page)
+    page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move(middle[0] + 4, middle[1], steps=2)
+    page.mouse.move(x + 4, y, steps=2)
     page.mouse.up()
     assert picked(page) in {(2, 1), (2, 2)}
     keep(page, "part-setup")
@@ -127,6 +146,121 @@ def test_a_part_is_set_up_by_picks_and_texts(server, page, study, chosen, keep):
     areas = {face.name: 1e6 * face.area for face in made.body.shape().faces}
     assert areas["touched"] == pytest.approx(LENGTH * WIDTH + 2 * HEIGHT * (LENGTH + WIDTH))
     assert areas[made.body.fixed] == pytest.approx(LENGTH * WIDTH)
+
+
+def test_a_click_asks_before_it_takes_a_face_away(server, page, study, keep):
+    """Nothing is chosen at first; what a click did is taken back, and done again, step by step."""
+    ready(page, server, study)
+    assert page.locator("#roles [aria-pressed=true]").count() == 0
+    page.mouse.click(*middle(page))
+    page.wait_for_selector("#ask:not([hidden])")
+    keep(page, "part-asks")
+    assert "This place is touched." in page.inner_text("#ask-words")
+    assert picked(page) == (2, 2)
+    page.keyboard.press("Escape")
+    page.wait_for_selector("#ask[hidden]", state="attached")
+    page.mouse.click(*middle(page))
+    page.click("#ask [data-role='1']")
+    assert picked(page) == (4, 0)
+    assert page.get_attribute("#roles [data-role='1']", "aria-pressed") == "true"
+    page.keyboard.press("Control+z")
+    assert picked(page) == (2, 2)
+    page.keyboard.press("Control+Shift+z")
+    assert picked(page) == (4, 0)
+    page.click("#undo")
+    assert picked(page) == (2, 2)
+    assert page.is_disabled("#undo")
+
+    page.click("#roles [data-role='2']")
+    page.mouse.click(*middle(page))  # it is touched already: a second click takes nothing back
+    page.wait_for_selector("#ask:not([hidden])")
+    assert picked(page) == (2, 2)
+    assert page.is_hidden("#ask [data-role='2']")
+    page.click("#ask [data-role='0']")
+    assert picked(page) == (2, 0)
+    page.click("[data-take=reset]")
+    assert picked(page) == (2, 2)
+    page.fill("#young", "4 kPa")
+    page.keyboard.press("Control+z")  # in a text it undoes letters
+    assert picked(page) == (2, 2)
+    page.focus("#part-view")
+    page.keyboard.press("Control+z")
+    assert picked(page) == (2, 0)
+
+
+def test_a_number_is_judged_when_its_field_is_left(server, page, study, chosen):
+    """The sentence goes as soon as the number is right, without leaving the field again; nothing begins meanwhile."""
+    ready(page, server, study)
+    page.fill("#ball-depth", "25 mm")
+    assert page.is_hidden("#ball-depth-misfit")
+    page.focus("#young")
+    assert "more than the part is thick, 20 mm" in misfit(page, "ball-depth")
+    page.focus("#ball-depth")
+    page.fill("#ball-depth", "2 mm")
+    page.wait_for_selector("#ball-depth-misfit[hidden]", state="attached")
+    for field, text, words in (
+        ("young", "4", "has no unit"),
+        ("young", "-4 kPa", "not above zero"),
+        ("poisson", "0.5", "less than 0.5"),
+        ("ball-radius", "3 cm", "larger than the part"),
+    ):
+        page.fill(f"#{field}", text)
+        page.press(f"#{field}", "Tab")
+        page.wait_for_selector(f"#{field}-misfit:has-text('{words}')")
+    page.select_option("#material", "liver")  # which has numbers of its own
+    page.fill("#ball-radius", "3 mm")
+    page.wait_for_selector("#ball-radius-misfit[hidden]", state="attached")
+    about = page.inner_text("#material-about")
+    assert "5.5 kPa" in about
+    assert "published from 3.9 kPa to 7.1 kPa" in about
+    assert "Roulot et al. 2008" in about
+    assert not chosen
+    begin(page)
+    page.wait_for_selector("html[data-stage=working]")
+    assert chosen[0].body.material == "liver"
+
+
+def test_the_held_face_is_seen_through_the_part(server, page, study):
+    """The underside is hatched in the colour of what is held, though the camera looks from above."""
+    ready(page, server, study)
+
+    def blue() -> int:
+        page.wait_for_timeout(300)  # until it is drawn
+        content = page.locator("#part-view").screenshot()
+        pixels = plt.imread(io.BytesIO(content), format="png")[:, :, :3]
+        return int((pixels[:, :, 2] > pixels[:, :, 0] + 0.15).sum())
+
+    assert blue() > 1000
+    page.locator("#face-list select").first.evaluate("s => s.closest('details').open = true")
+    for select in page.locator("#face-list select").all():
+        if select.input_value() == "1":
+            select.select_option("0")
+    assert picked(page) == (0, 2)
+    assert blue() == 0
+
+
+def test_a_page_whose_server_is_gone_says_so(server, page, study, complaints):
+    ready(page, server, study)
+    server.stop()
+    page.wait_for_selector("#banner:not([hidden])")
+    assert "The server of this page has ended" in page.inner_text("#banner")
+    assert page.is_disabled("#start")
+    complaints.clear()  # of the connection that is refused
+
+
+def test_the_page_fits_a_phone(server, page, study):
+    page.set_viewport_size({"width": 390, "height": 844})
+    ready(page, server, study)
+    page.click("#face-details summary")
+    page.fill("#ball-depth", "25 mm")
+    page.press("#ball-depth", "Tab")
+    misfit(page, "ball-depth")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    small = page.evaluate(
+        "[...document.querySelectorAll('button, select, input, summary')].filter(e => e.offsetParent)"
+        ".map(e => [e.id || e.textContent, e.getBoundingClientRect().height]).filter(([, height]) => height < 44)"
+    )
+    assert small == []
 
 
 @pytest.fixture
@@ -234,9 +368,7 @@ def test_the_page_draws_the_lengths_that_the_server_reads(server, page, study):
         except UsageError:
             return 0.0  # nothing is drawn
 
-    page.wait_for_selector("html[data-stage=reading]")
-    server.show_part(shown_part(study))
-    page.wait_for_selector("html[data-partdrawn][data-picked]")
+    ready(page, server, study)
     for text in LENGTHS:
         page.fill("#ball-radius", text)
         drawn = float(page.get_attribute("#ball-radius", "data-metres"))

@@ -13,6 +13,7 @@ from palpate.cli.console import Console
 from palpate.cli.device_commands import devices_app
 from palpate.cli.exchange_commands import card, export_dataset
 from palpate.cli.export_commands import export_app
+from palpate.cli.init_command import init
 from palpate.cli.material_commands import material_app
 from palpate.cli.number_options import count_option, number_option
 from palpate.cli.sweep_command import sweep
@@ -129,40 +130,7 @@ def demo(
             console.say("No terminal, so no page is served: `palpate view FILE` does it.")
 
 
-@app.command()
-def init(
-    path: Annotated[
-        Path,
-        typer.Argument(
-            help="File to write, NAME.toml. Or a part (STL, OBJ, STEP, VTU, MSH, INP and others): its study is written "
-            "beside it."
-        ),
-    ] = STUDY,
-    preset: Annotated[
-        str,
-        typer.Option(
-            help="Named study to start from, such as block, layered, liver, grasp, beam-copper or beam-plastic."
-        ),
-    ] = "beam-nylon",
-    unit: Annotated[
-        str | None,
-        typer.Option(
-            help="For a part: unit of the file's numbers. Default: mm, or m where only that fits; asked for where "
-            "both fit."
-        ),
-    ] = None,
-    sample: Annotated[
-        bool, typer.Option("--sample", help="Write a part to try: a kidney-like organ, kidney.stl.")
-    ] = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a study, or a sample, that palpate wrote; nothing else.")
-    ] = False,
-    show: Annotated[bool, typer.Option("--print", help="Print the study instead of writing a file.")] = False,
-) -> None:
-    """Write a study file with a comment for every key: of a named study, or of a part."""
-    from palpate.cli.init_command import init_study
-
-    init_study(path, preset, unit, default=path == STUDY, sample=sample, force=force, show=show)
+app.command()(init)
 
 
 @app.command()

@@ -82,11 +82,13 @@ def _option(
 def declared_option(record: type[Options], field: str, help: str = "") -> Any:
     """Return the declaration of a command's option by that in a record of options; a `help` says it otherwise."""
     declaration = declarations(record)[field]
-    name, text = declaration.flag or f"--{field}".replace("_", "-"), help or declaration.sentence
+    names, text = (declaration.flag or f"--{field}".replace("_", "-")).split(), help or declaration.sentence
     if declaration.kind.startswith("float"):
-        return number_option(name, declaration.unit, help=text, bare=declaration.bare, **declaration.ends)
+        return number_option(names[0], declaration.unit, help=text, bare=declaration.bare, **declaration.ends)
     is_count = declaration.kind.startswith("int")
-    return count_option(name, help=text, **declaration.ends) if is_count else typer.Option(name, help=text)
+    return (
+        count_option(names[0], help=text, **declaration.ends) if is_count else typer.Option(*names, help=text)
+    )
 
 
 def _parameters(source: Any) -> list[inspect.Parameter]:

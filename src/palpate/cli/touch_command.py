@@ -89,7 +89,7 @@ def _study_on_page(
     """
     from palpate.study.part_study import part_study, study_file
 
-    file = study_file(part)
+    file = study_file(part, choices.name)
     if file.exists():
         return _study_of(part, choices, console), file, True
     with console.patience(f"Reading {part}"):
@@ -105,7 +105,7 @@ def _write(part: Path, study: Study, notes: list[str]) -> Path:
     from palpate.files import write_file
     from palpate.study.part_study import part_text, study_file
 
-    file = study_file(part)
+    file = study_file(part, study.name)
     write_file(file, part_text(study, notes))
     return file
 
@@ -116,17 +116,19 @@ def _study_of(part: Path, choices: PartOptions, console: Console) -> Study:
     from palpate.study import read_study
     from palpate.study.part_study import part_study, part_text, study_file
 
-    file = study_file(part)
+    file = study_file(part, choices.name)
     if file.exists():
         with console.patience(f"Reading {file} and {part}"):
             study = read_study(file)
         said = _choices_of(study)
-        given = {name: value for name, value in vars(choices).items() if value not in (None, ())}
+        given = {
+            name: value for name, value in vars(choices).items() if value not in (None, ()) and name != "name"
+        }
         if others := [name for name, value in given.items() if not _are_equal(said.get(name), value)]:
             raise UsageError(
                 f"{file} exists already, and says what is held, touched and of what material.",
                 why=f"It says otherwise of {', '.join('--' + name for name in others)}.",
-                fix="Change the file and leave the options out, or delete it with its solves.",
+                fix="Change the file and leave the options out, or give a new study another name: --name NAME.",
             )
         _require_part(study, file, part)
         console.say(f"Going on with the study {file} …")
@@ -146,7 +148,7 @@ def _require_part(study: Study, file: Path, part: Path) -> None:
         raise UsageError(
             f"{file} exists already, and is no study of {part.name}.",
             why=f"It is one of {'another body' if other is None else Path(other).name}.",
-            fix="Rename the part, or the study with its files.",
+            fix="Give the study of this part another name: --name NAME.",
         )
 
 
@@ -161,7 +163,9 @@ def _choices_of(study: Study) -> dict[str, Any]:
         return {}
     said: dict[str, Any] = {"radius": acting.radius, "depth": acting.depth[1], "touched": acting.touches}
     said |= {"unit": body.unit, "held": body.fixed_names()}
-    if isinstance(body.material, SolidMaterialRecord):
+    if isinstance(body.material, str):
+        said["material"] = body.material
+    elif isinstance(body.material, SolidMaterialRecord):
         said |= {"young": body.material.young, "poisson": body.material.poisson}
     return said
 

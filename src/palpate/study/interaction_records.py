@@ -39,7 +39,10 @@ class LoadRecord(Record):
     @model_validator(mode="after")
     def _a_range_and_a_direction(self) -> LoadRecord:
         if not self.low < self.high:
-            raise ValueError(f"its range is empty: low {self.low:g} N is not below high {self.high:g} N")
+            raise ValueError(
+                f"its range is empty: low {self.low:g} N is not below high {self.high:g} N; for example "
+                'low = "0 N" and high = "5 N"'
+            )
         if not any(self.direction):
             raise ValueError("its direction (0, 0) points nowhere")
         return self
@@ -102,7 +105,10 @@ class ProbeRecord(_OnSurface):
     @model_validator(mode="after")
     def _in_order(self) -> ProbeRecord:
         if not 0 <= self.depth[0] < self.depth[1]:
-            raise ValueError(f"the depth {self.depth[0]:g} … {self.depth[1]:g} m is no range from 0 on")
+            raise ValueError(
+                f"the depth {self.depth[0]:g} … {self.depth[1]:g} m is no range from 0 on; it is measured into the "
+                'body, the least one first; for example depth = ["0.2 mm", "8 mm"]'
+            )
         _require_corners(self.over)
         return self
 
@@ -138,7 +144,10 @@ class PadRecord(_OnSurface):
         _require_corners(self.over)
         for low, high in self.displacement:
             if not low < high:
-                raise ValueError(f"the displacement {low:g} … {high:g} m is no range: low is less than high")
+                raise ValueError(
+                    f"the displacement {low:g} … {high:g} m is no range: the lower end comes first; for example "
+                    '["-4 mm", "4 mm"] for each of x, y and z'
+                )
         return self
 
     def build(self, body: Any, *, whole: bool = True) -> GluedPad:
@@ -155,7 +164,10 @@ class PadRecord(_OnSurface):
 
 def _require_corners(over: tuple[Any, Any] | None) -> None:
     if over and not all(a < b for a, b in zip(*over, strict=True)):
-        raise ValueError("the corners of `over` are not in order: the lower one comes first")
+        raise ValueError(
+            "the corners of `over` are not in order: the lower one comes first; for example "
+            '[["30 mm", "30 mm"], ["70 mm", "70 mm"]]'
+        )
 
 
 class VariedRecord(Record):

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from palpate.errors import UsageError
-from palpate.format import millimetres, pressure
+from palpate.format import millimetres
 from palpate.physics import ImportedMesh, named_material
-from palpate.physics.materials.library import MATERIALS
+from palpate.physics.materials.library import MATERIALS, material_kind, material_words
 from palpate.physics.shapes.body_file import UNITS, apply_patches
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.naming import members
@@ -26,7 +26,7 @@ from palpate.study.part_study import COARSE, HELD, TOUCHED
 from palpate.study.study import Study
 
 if TYPE_CHECKING:
-    from palpate.viewer.shown_part import PartChoices, ShownPart
+    from palpate.viewer.shown_part import PartChoices, ShownMaterial, ShownPart
 
 __all__ = ["LAWS", "chosen_study", "shown_part"]
 
@@ -63,7 +63,7 @@ def shown_part(study: Study) -> ShownPart:
         ),
         units=tuple(UNITS) if body.unit else (),
         whole=bool(getattr(bare, "is_cad", False)),
-        materials={name: _about(name) for name in MATERIALS if _is_for_solids(name)},
+        materials={name: _shown_material(name) for name in MATERIALS if _is_for_solids(name)},
         laws=LAWS,
         notes=tuple(bare.notes),
     )
@@ -191,18 +191,11 @@ def _require_surfaces(held: np.ndarray, touched: np.ndarray) -> None:
 
 def _require_room(body: PartRecord, skin: BodyMesh, touched: np.ndarray, choices: PartChoices) -> None:
     """Refuse a ball or a depth that the part leaves no room for, and elements that are larger than the ball."""
+    from palpate.viewer.shown_part import require_room
+
     low, high = skin.corners
-    least, longest = float((high - low).min()), float((high - low).max())
-    if 2 * choices.radius > longest:
-        raise UsageError(
-            f"The ball, {millimetres(2 * choices.radius)} across, is larger than the part, {millimetres(longest)}.",
-            fix="Choose a smaller radius.",
-        )
-    if choices.depth >= least:
-        raise UsageError(
-            f"The depth of {millimetres(choices.depth)} is more than the part is thick, {millimetres(least)}.",
-            fix="Choose a smaller depth.",
-        )
+    require_room("radius", choices.radius, high - low)
+    require_room("depth", choices.depth, high - low)
     if isinstance(body.bare(), ImportedMesh):
         corners = skin.points[skin.triangles[touched]]
         size = float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
@@ -229,12 +222,15 @@ def _material(body: PartRecord, choices: PartChoices) -> Any:
     }
 
 
+def _shown_material(name: str) -> ShownMaterial:
+    """Return a material of the library as the page shows it."""
+    from palpate.viewer.shown_part import ShownMaterial
+
+    material = named_material(name)
+    young = 2 * material.shear_modulus * (1 + material.poisson)
+    return ShownMaterial(material_words(name), material_kind(name), young, material.poisson)
+
+
 def _is_for_solids(name: str) -> bool:
     """Return whether a material of the library can be that of a solid that is learnt from rest."""
     return not hasattr(named_material(name), "hardening")
-
-
-def _about(name: str) -> str:
-    material = named_material(name)
-    young = 2 * material.shear_modulus * (1 + material.poisson)
-    return f"{type(material).__name__}, Young's modulus {pressure(young)} at small strains"

@@ -22,7 +22,7 @@ from palpate.study.part_records import PartRecord, part_shape
 from palpate.study.study import Study
 from palpate.study.toml import to_toml
 
-__all__ = ["part_study", "part_text", "study_file"]
+__all__ = ["part_study", "part_text", "study_file", "study_name"]
 
 HELD, TOUCHED = "held", "touched"
 YOUNG, POISSON = 10e3, 0.45  # Pa; of soft tissue, until the user says what it is
@@ -72,16 +72,12 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     if options.held:
         fixed, named = tuple(options.held), []
     content: dict[str, Any] = {
-        "name": _study_name(_stem(path)),
+        "name": study_name(path, options.name),
         "body": {
             "kind": "part",
             "file": str(path),
             "unit": unit,
-            "material": {
-                "young": YOUNG if options.young is None else options.young,
-                "poisson": POISSON if options.poisson is None else options.poisson,
-                "name": "neo-Hookean",
-            },
+            "material": _material(options),
             "fixed": fixed,
             "surfaces": named,
         },
@@ -98,6 +94,20 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     study = _suit(study, content, element)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
+
+
+def _material(options: PartOptions) -> str | dict[str, Any]:
+    """Return the material of the options: a name, or Young's modulus and Poisson's ratio."""
+    if options.material is None:
+        young = YOUNG if options.young is None else options.young
+        poisson = POISSON if options.poisson is None else options.poisson
+        return {"young": young, "poisson": poisson, "name": "neo-Hookean"}
+    if options.young is not None or options.poisson is not None:
+        raise UsageError(
+            f"The material {options.material} has a Young's modulus and a Poisson's ratio of its own.",
+            fix="Give either the name of a material, or its numbers.",
+        )
+    return options.material.strip().lower()
 
 
 def _suit(study: Study, content: dict[str, Any], element: float) -> Study:
@@ -208,9 +218,23 @@ def _study_of(content: dict[str, Any]) -> Study:
         ) from error
 
 
-def study_file(part: str | os.PathLike[str]) -> Path:
-    """Return the path of the study of a part: beside it, under a name that its files can have."""
-    return Path(part).with_name(f"{_study_name(_stem(Path(part)))}.toml")
+def study_file(part: str | os.PathLike[str], name: str | None = None) -> Path:
+    """Return the path of the study of a part, beside it: under a name of its own, or under that of the part."""
+    return Path(part).with_name(f"{study_name(part, name)}.toml")
+
+
+def study_name(part: str | os.PathLike[str], name: str | None = None) -> str:
+    """Return the name of the study of a part and of its files: the one that is given, or one made of the part's."""
+    if name is None:
+        return _file_name(_stem(Path(part)))
+    stem = name.removesuffix(".toml")
+    if stem and stem == _file_name(stem):
+        return stem
+    raise UsageError(
+        f"A study can't be called {name!r}.",
+        why="Its files are named after it, and lie beside the part.",
+        fix=f"Use letters, digits, dots, hyphens and underscores: {_file_name(stem)}.",
+    )
 
 
 def _stem(part: Path) -> str:
@@ -218,8 +242,8 @@ def _stem(part: Path) -> str:
     return Path(part.stem).stem if part.suffix.lower() == ".gz" else part.stem
 
 
-def _study_name(stem: str) -> str:
-    """Return a name for files, made of the name of a part's file."""
+def _file_name(stem: str) -> str:
+    """Return a name that files can have, made of another."""
     return re.sub(r"[^A-Za-z0-9._-]+", "-", stem).strip("-._") or "part"
 
 

@@ -7,7 +7,7 @@ The conversation, over a websocket of its own at ``/part``:
    ``/part/surface`` and for `PartFaces` at ``/part/faces``.
 2. A page may ask for another unit of the file's numbers with `UnitWish` (JSON). What was picked on the surface is sent
    as `Picks`, in pieces that are small enough for one message each; then `StartWish` (JSON) says all other
-   choices. The server answers each wish with an `Answer` (JSON).
+   choices. A `StartWish` on trial asks only whether they fit. The server answers each wish with an `Answer` (JSON).
 3. While solves run, `LearningProgress` (JSON) says how far they are. A page ends the work with `EndWish`.
 4. Where `PartNews.version` is not zero, the body can be touched: the page joins the conversation at ``/touch``. Each
    later surrogate is announced there by a new `Hello` with a larger version; the page fetches that version's surface,
@@ -121,6 +121,9 @@ class MaterialInfo:
 
     name: str
     about: str
+    kind: str  # ``tissue``, ``silicone`` or ``other``
+    young: str  # Young's modulus at small strains, with its unit
+    poisson: str  # Poisson's ratio
 
 
 @dataclass(frozen=True)
@@ -162,6 +165,7 @@ class StartWish(Json):
     poisson: str  # Poisson's ratio of an own material
     radius: str  # of the ball
     depth: str  # how deep the ball presses at most
+    trial: bool = False  # whether the choices are judged only, and nothing begins
 
 
 @dataclass(frozen=True)
@@ -173,9 +177,11 @@ class UnitWish(Json):
 
 @dataclass(frozen=True)
 class Answer(Json):
-    """The answer to `StartWish`, server to page: a problem in a sentence or two, or nothing where the work begins."""
+    """The answer to `StartWish` and `UnitWish`, server to page: problems in sentences, or none where all fits."""
 
-    problem: str
+    problem: str  # of the whole; empty where there is none
+    # problems of single choices, by the names of `StartWish`; null: none of them was judged
+    fields: Mapping[str, str] | None = None
 
 
 @dataclass(frozen=True)

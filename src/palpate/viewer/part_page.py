@@ -344,14 +344,15 @@ class PartPage(LocalServer):
         with self._starting:
             if self._part is None or self._stage != "choosing":
                 return Answer("The work has begun already, by another page." if self._part else "")
+            misfits = None if isinstance(wish, UnitWish) else self._part.misfits(wish)
             try:
                 if isinstance(wish, UnitWish):
                     self._take_unit(self._part, wish.unit)
-                else:
+                elif not (misfits or wish.trial):
                     self._start_by(self._part, visitor, wish)
             except PalpateError as error:
-                return Answer(" ".join(filter(None, (error.what, error.why, error.fix))))
-            return Answer("")
+                return Answer(" ".join(filter(None, (error.what, error.why, error.fix))), misfits)
+            return Answer("", misfits)
 
     def _take_unit(self, part: ShownPart, unit: str) -> None:
         if self._on_unit is not None and unit in part.units:

@@ -13,12 +13,21 @@ from functools import cached_property
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.format import millimetres
 from palpate.units import parse_quantity
 from palpate.viewer.messages import Surface
 from palpate.viewer.part_messages import FaceInfo, MaterialInfo, PartFaces, PartFacts, Role, StartWish
 from palpate.viewer.surfaces import split
 
-__all__ = ["PartChoices", "ShownPart", "as_wish", "choices_of"]
+__all__ = ["PartChoices", "ShownMaterial", "ShownPart", "as_wish", "choices_of", "require_room"]
+
+_QUANTITIES = {
+    "young": ("Young's modulus", "Pa"),
+    "poisson": ("Poisson's ratio", ""),
+    "radius": ("The radius of the ball", "m"),
+    "depth": ("The depth", "m"),
+}
+"""The choices that are numbers, by their names in `StartWish`, with what they are called and their SI units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +42,16 @@ class PartChoices:
     depth: float  # largest depth of the ball, m
     held: np.ndarray | None = None  # (k,) int, triangles; None: as chosen at first
     touched: np.ndarray | None = None  # (k,) int, triangles; None: as chosen at first
+
+
+@dataclass(frozen=True)
+class ShownMaterial:
+    """A material that can be asked for by name."""
+
+    about: str  # what there is to say of it, in words
+    kind: str = "other"  # or ``tissue`` or ``silicone``
+    young: float = 10e3  # Young's modulus at small strains, Pa
+    poisson: float = 0.45
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +70,7 @@ class ShownPart:
     choices: PartChoices
     units: tuple[str, ...] = ()  # in which the file's numbers could be taken instead
     whole: bool = False  # faces can be picked as a whole only, as those of a CAD file
-    materials: Mapping[str, str] = field(default_factory=dict)  # what to say of each, by name
+    materials: Mapping[str, ShownMaterial] = field(default_factory=dict)  # by name
     laws: tuple[str, ...] = ("neo-hookean",)  # that take Young's modulus and Poisson's ratio
     notes: tuple[str, ...] = ()  # what else to say of the file, in sentences
 
@@ -68,13 +87,31 @@ class ShownPart:
         roles[np.asarray(self.held, dtype=bool)] = float(Role.HELD)
         return PartFaces(faces=np.asarray(self.face_of), roles=roles)
 
+    @cached_property
+    def size(self) -> np.ndarray:
+        """Lengths (3,) of the box around it, m."""
+        return np.ptp(np.asarray(self.points, dtype=float)[np.asarray(self.triangles)].reshape(-1, 3), axis=0)
+
+    def misfits(self, wish: StartWish) -> dict[str, str]:
+        """Return what is wrong with numbers of a wish, in sentences by the names of `StartWish`."""
+        problems: dict[str, str] = {}
+        for name in _QUANTITIES:
+            if wish.material and name in {"young", "poisson"}:
+                continue  # those of the material are taken
+            try:
+                number = _quantity(name, getattr(wish, name))
+                if name in {"radius", "depth"}:
+                    require_room(name, number, self.size)
+            except UsageError as error:
+                problems[name] = " ".join(filter(None, (error.what, error.why, error.fix)))
+        return problems
+
     def facts(self) -> PartFacts:
         """Return what the page asks for first."""
         corners = np.asarray(self.points, dtype=float)[np.asarray(self.triangles)]
         area = (
             np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
         )
-        size = np.ptp(corners.reshape(-1, 3), axis=0)
         middle, faces = corners.mean(axis=1), []
         for index, name in enumerate(self.faces):
             mine = np.asarray(self.face_of) == index
@@ -85,10 +122,13 @@ class ShownPart:
             file=self.file,
             unit=self.unit,
             units=self.units,
-            size=(float(size[0]), float(size[1]), float(size[2])),
+            size=(float(self.size[0]), float(self.size[1]), float(self.size[2])),
             faces=tuple(faces),
             whole=self.whole,
-            materials=tuple(MaterialInfo(name, about) for name, about in self.materials.items()),
+            materials=tuple(
+                MaterialInfo(name, m.about, m.kind, f"{m.young / 1e3:.6g} kPa", f"{m.poisson:.6g}")
+                for name, m in self.materials.items()
+            ),
             laws=self.laws,
             choices={
                 name: getattr(wish, name)
@@ -116,18 +156,40 @@ def choices_of(wish: StartWish, held: np.ndarray | None, touched: np.ndarray | N
     return PartChoices(
         material=wish.material,
         law=wish.law,
-        young=_above_zero("Young's modulus", wish.young, "Pa") if own else 0.0,
-        poisson=parse_quantity(wish.poisson, "", "Poisson's ratio") if own else 0.0,
-        radius=_above_zero("The radius of the ball", wish.radius, "m"),
-        depth=_above_zero("The depth", wish.depth, "m"),
+        young=_quantity("young", wish.young) if own else 0.0,
+        poisson=_quantity("poisson", wish.poisson) if own else 0.0,
+        radius=_quantity("radius", wish.radius),
+        depth=_quantity("depth", wish.depth),
         held=held,
         touched=touched,
     )
 
 
-def _above_zero(name: str, text: str, unit: str) -> float:
-    """Return a quantity above zero in an SI unit; its text must say a unit."""
-    number = parse_quantity(text, unit, name)
-    if number > 0:
-        return number
-    raise UsageError(f"{name} is {text.strip()}, which is not above zero.", fix="Choose a larger one.")
+def require_room(name: str, length: float, size: np.ndarray) -> None:
+    """Refuse a ball's ``radius`` or a ``depth`` in m for which a part of this size (3,) in m has no room."""
+    least, longest = float(size.min()), float(size.max())
+    if name == "radius" and 2 * length > longest:
+        raise UsageError(
+            f"The ball, {millimetres(2 * length)} across, is larger than the part, {millimetres(longest)}.",
+            fix="Choose a smaller radius.",
+        )
+    if name == "depth" and length >= least:
+        raise UsageError(
+            f"The depth of {millimetres(length)} is more than the part is thick, {millimetres(least)}.",
+            fix="Choose a smaller depth.",
+        )
+
+
+def _quantity(name: str, text: str) -> float:
+    """Return a choice in its SI unit; its text must say a unit where it has one, and be in range."""
+    title, unit = _QUANTITIES[name]
+    number = parse_quantity(text, unit, title)
+    if name == "poisson":
+        if not 0 <= number < 0.5:
+            raise UsageError(
+                f"{title} is {text.strip()}, which is out of range.",
+                fix="Choose one from 0 to less than 0.5; 0.45 suits soft tissue.",
+            )
+    elif number <= 0:
+        raise UsageError(f"{title} is {text.strip()}, which is not above zero.", fix="Choose a larger one.")
+    return number

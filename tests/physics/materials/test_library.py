@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ import pytest
 from palpate.errors import UsageError
 from palpate.physics.materials import MATERIALS, LinearElastic, NeoHookean, Ogden, named_material
 from palpate.physics.materials.homogeneous import uniaxial
+from palpate.physics.materials.library import material_words
+from palpate.physics.materials.tissues import TISSUES
 
 ELASTIC = [m for m in MATERIALS.values() if not m.states]
 SILICONES = ("ecoflex 00-10", "ecoflex 00-30", "ecoflex 00-50")
@@ -65,3 +68,16 @@ def test_a_body_can_ask_for_a_law():
     assert "copper, nylon" in caught.value.why
     with pytest.raises(UsageError, match="ecoflx"):
         named_material("ecoflx 00-30")
+
+
+@pytest.mark.parametrize("tissue", TISSUES.values(), ids=lambda tissue: tissue.name)
+def test_a_tissue_lies_within_the_deviation_of_its_sources(tissue):
+    assert tissue.low < tissue.young < tissue.high
+    pairs = re.findall(r"([\d.]+) ± ([\d.]+) kPa", tissue.measured.partition("; with")[0])
+    measured = [(1e3 * float(mean), 1e3 * float(deviation)) for mean, deviation in pairs]
+    if measured:
+        assert tissue.young == pytest.approx(measured[0][0], rel=0.02)
+        assert tissue.low == pytest.approx(min(mean - deviation for mean, deviation in measured), rel=0.03)
+        assert tissue.high == pytest.approx(max(mean + deviation for mean, deviation in measured), rel=0.03)
+    assert named_material(tissue.name).young == tissue.young
+    assert all(source in material_words(tissue.name) for source in tissue.sources)

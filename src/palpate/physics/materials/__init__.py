@@ -13,6 +13,7 @@
     homogeneous    uniaxial, equibiaxial, planar, shear and volumetric tests
     material_stability  Drucker's criterion over a range of strains
     library        materials by name, with sources
+tissues        moduli of soft tissues, their ranges and sources
     specimen_tests, law_forms, fit_law, material_fit   constants from tests, and what they tell
     fit_relaxation a Prony series from a response that fades
 

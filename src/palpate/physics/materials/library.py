@@ -8,20 +8,24 @@ and that of adipose tissue in ICRU Report 44 (1989).
 
 from __future__ import annotations
 
-from typing import TypeVar, overload
+from typing import Literal, TypeVar, overload
 
 from palpate.checks import did_you_mean
 from palpate.errors import UsageError
+from palpate.format import pressure
 from palpate.physics.materials.hardening import VoceHardening
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.material import Elastic
 from palpate.physics.materials.neo_hooke import NeoHookean
 from palpate.physics.materials.ogden import Ogden
 from palpate.physics.materials.plastic import Plastic
+from palpate.physics.materials.tissues import TISSUES
 from palpate.physics.materials.viscous import Viscoelastic
 
 __all__ = [
     "MATERIALS",
+    "material_kind",
+    "material_words",
     "named_material",
 ]
 
@@ -73,9 +77,28 @@ MATERIALS: dict[str, Elastic] = {
         _FAT,
         Viscoelastic(_FAT, ((0.39, 700.0),), name="porcine fat viscoelastic"),
         _ANNEALED_COPPER,
+        *(tissue.material for tissue in TISSUES.values()),
     )
 }
 """Materials that can be asked for by name."""
+
+
+def material_kind(name: str) -> Literal["tissue", "silicone", "other"]:
+    """Return the kind of a material that can be asked for by name."""
+    if name in TISSUES:
+        return "tissue"
+    return "silicone" if name.startswith(("ecoflex", "dragon skin")) else "other"
+
+
+def material_words(name: str) -> str:
+    """Return what there is to say of a material that has a name: law, modulus, range, and source."""
+    material, tissue = named_material(name), TISSUES.get(name)
+    young = pressure(2 * material.shear_modulus * (1 + material.poisson))
+    words = f"{material.law}, Young's modulus {young} at small strains"
+    if tissue is not None:
+        words += f"; published from {pressure(tissue.low)} to {pressure(tissue.high)}"
+    source = material.source or "no source"
+    return f"{words}. {source[0].upper()}{source[1:]}."
 
 
 @overload

@@ -72,6 +72,9 @@ export interface FaceInfo {
 export interface MaterialInfo {
   name: string;
   about: string;
+  kind: string;
+  young: string;
+  poisson: string;
 }
 
 /** A touchable body and its loop, once per connection, server to page. */
@@ -176,6 +179,7 @@ export interface StartWish {
   poisson: string;
   radius: string;
   depth: string;
+  trial: boolean;
 }
 
 /** The wish that the numbers of the file are taken in another unit, page to server. */
@@ -183,9 +187,10 @@ export interface UnitWish {
   unit: string;
 }
 
-/** The answer to `StartWish`, server to page: a problem in a sentence or two, or nothing where the work begins. */
+/** The answer to `StartWish` and `UnitWish`, server to page: problems in sentences, or none where all fits. */
 export interface Answer {
   problem: string;
+  fields: Record<string, unknown> | null;
 }
 
 /** The state of solving and learning, server to page. */

@@ -23,6 +23,7 @@ import { touch } from "./touch";
 import type { Touched } from "./touch";
 import { element, tidy } from "./units";
 
+const GONE = "The server of this page has ended. What is chosen here stays while the page is open: give the command again.";
 const PIECE = 900; // triangles in a message: the server takes 4 kB
 const AGAIN = 1000; // ms until a lost connection is tried again
 
@@ -49,10 +50,22 @@ export function part(): void {
 function connect(): void {
   socket = new WebSocket(`ws://${location.host}/part`);
   socket.onmessage = (event: MessageEvent<string>) => hear(JSON.parse(event.data) as { kind: string });
+  socket.onopen = () => served(true);
   socket.onclose = () => {
-    if (!touched) status("lost", "disconnected, trying again");
+    if (!touched) served(false);
     setTimeout(connect, AGAIN);
   };
+}
+
+/** Say that the server is gone, or take that back. */
+function served(on: boolean): void {
+  if (setup) setup.connected = on;
+  if (on) {
+    element("banner").hidden = true;
+    return;
+  }
+  status("lost", "disconnected, trying again");
+  say(GONE, "bad");
 }
 
 function send(message: string | ArrayBuffer): void {
@@ -61,7 +74,7 @@ function send(message: string | ArrayBuffer): void {
 
 function hear(message: { kind: string }): void {
   if (isPartNews(message)) turn(message);
-  if (isAnswer(message)) setup?.answer(message.problem);
+  if (isAnswer(message)) setup?.answer(message.problem, message.fields as Record<string, string> | null);
   if (!isLearningProgress(message)) return;
   progress = message;
   learning.hear(message);
@@ -96,7 +109,8 @@ function choose(): void {
     .then((facts) => {
       if (news?.stage !== "choosing") return;
       mode("setup");
-      setup ??= new Setup(canvas, view!, facts, begin, (unit) => send(JSON.stringify({ kind: "UnitWish", unit })));
+      const judge = (wish: StartWish): void => send(JSON.stringify({ kind: "StartWish", ...wish }));
+      setup ??= new Setup(canvas, view!, facts, begin, judge, (unit) => send(JSON.stringify({ kind: "UnitWish", unit })));
       view!.look();
     })
     .catch(fail);

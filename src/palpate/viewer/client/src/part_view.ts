@@ -1,6 +1,7 @@
-// A part that is set up: its surface, what of it is held and touched, and how much of it a pick takes.
+// A part that is set up: its surface, what of it is held and touched, and how much of it a pick takes. What is held is seen through the
+// body, hatched, where it lies on the far side.
 
-import { BufferGeometry, Mesh, MeshLambertMaterial, MOUSE, Vector3 } from "three";
+import { BufferGeometry, DoubleSide, GreaterDepth, Mesh, MeshBasicMaterial, MeshLambertMaterial, MOUSE, Vector3 } from "three";
 import { Role } from "./messages";
 import type { PartFaces, Surface, Vec3 } from "./messages";
 import { SurfaceView } from "./surface_view";
@@ -23,6 +24,8 @@ export class PartView extends SurfaceView {
   private readonly faces: Uint32Array;
   private readonly held: Mesh<BufferGeometry, MeshLambertMaterial>;
   private readonly touched: Mesh<BufferGeometry, MeshLambertMaterial>;
+  private readonly asked: Mesh<BufferGeometry, MeshLambertMaterial>; // what a click would take
+  private readonly behind: Mesh<BufferGeometry, MeshBasicMaterial>; // what is held, on the far side
   private neighbours: Int32Array | null = null; // three of each triangle, -1 for none
 
   constructor(canvas: HTMLCanvasElement, surface: Surface, faces: PartFaces, words: readonly Element[]) {
@@ -38,8 +41,11 @@ export class PartView extends SurfaceView {
     this.measure();
     const still = new Float32Array(surface.rest.length);
     this.deform(still, 1, new Float32Array(still.length / 3), null, LAYERS);
-    [this.held, this.touched] = [this.overlay(), this.overlay()];
-    this.scene.add(this.held, this.touched);
+    [this.held, this.touched, this.asked] = [this.overlay(), this.overlay(), this.overlay()];
+    this.behind = new Mesh(this.held.geometry, hatched());
+    this.behind.frustumCulled = false;
+    this.behind.renderOrder = 2; // after the surfaces, behind which it lies
+    this.scene.add(this.held, this.touched, this.asked, this.behind);
     this.probe.material.opacity = 0.35;
     this.recolour();
     this.refresh();
@@ -97,6 +103,12 @@ export class PartView extends SurfaceView {
     this.refresh();
   }
 
+  /** Mark the triangles that a click would take. */
+  ask(triangles: readonly number[]): void {
+    this.pick(this.asked, triangles);
+    this.dirty = true;
+  }
+
   /** Area with a role, m². */
   area(role: number): number {
     return this.areas.reduce((sum, area, t) => sum + (this.roles[t] === role ? area : 0), 0);
@@ -140,19 +152,27 @@ export class PartView extends SurfaceView {
     super.recolour();
     this.held?.material.color.set(css("--accent-2")); // not there yet while the base class is made
     this.touched?.material.color.set(css("--accent"));
+    this.asked?.material.color.set(css("--warn"));
+    this.behind?.material.color.set(css("--accent-2"));
   }
 
   private refresh(): void {
-    const { triangles } = this.surface;
     for (const [mesh, role] of [
       [this.held, Role.HELD],
       [this.touched, Role.TOUCHED],
     ] as const) {
-      const index = this.where((t) => this.roles[t] === role).flatMap((t) => [...triangles.subarray(3 * t, 3 * t + 3)]);
-      mesh.geometry.setIndex(index);
-      mesh.visible = index.length > 0;
+      this.pick(mesh, this.where((t) => this.roles[t] === role));
     }
+    this.pick(this.asked, []);
+    this.behind.visible = this.held.visible;
     this.dirty = true;
+  }
+
+  /** Let a second skin cover some triangles. */
+  private pick(mesh: Mesh, chosen: readonly number[]): void {
+    const { triangles } = this.surface;
+    mesh.geometry.setIndex(chosen.flatMap((t) => [...triangles.subarray(3 * t, 3 * t + 3)]));
+    mesh.visible = chosen.length > 0;
   }
 
   /** A second skin on the part's own points, for some of its triangles. */
@@ -206,6 +226,17 @@ export class PartView extends SurfaceView {
     for (let t = 0; t < this.roles.length; t++) if (test(t)) chosen.push(t);
     return chosen;
   }
+}
+
+/** Stripes of the picture's own pixels, drawn only where something lies in front. */
+function hatched(): MeshBasicMaterial {
+  const material = new MeshBasicMaterial({ transparent: true, opacity: 0.5, depthWrite: false, side: DoubleSide });
+  material.depthFunc = GreaterDepth;
+  material.onBeforeCompile = (shader) => {
+    const stripes = "if (mod(gl_FragCoord.x + gl_FragCoord.y, 12.0) > 4.0) discard;";
+    shader.fragmentShader = shader.fragmentShader.replace("#include <clipping_planes_fragment>", stripes);
+  };
+  return material;
 }
 
 function dot(a: Vec3, b: Vec3): number {

@@ -1,24 +1,32 @@
 // The form on which a part is set up: picks on its surface, material, ball, and the start.
+//
+// No role is chosen at first, so that a click changes nothing by mistake: it asks what the place shall be. With a role, a click gives
+// it; nothing is taken back by a second click, for which there is *neither*, and undo.
 
 import { Role } from "./messages";
 import type { PartFacts, StartWish } from "./messages";
+import { PartForm } from "./part_form";
 import type { PartView, Pointed } from "./part_view";
-import { lengthOf } from "./lengths";
+import { PickHistory } from "./pick_history";
 import { element, input, tidy, worded } from "./units";
 
 const CLICK = 5; // px that a pointer may move and still click
 const LISTED = 60; // faces in the list
+const ROLES: Record<number, string> = { [Role.FREE]: "neither", [Role.HELD]: "held", [Role.TOUCHED]: "touched" };
 const TOOLS = {
-  face: "Click on a face to pick it; click again to take it back.",
-  patch: "Click on the surface: what is smooth around that place is picked; click again to take it back.",
+  face: "A click takes a whole face.",
+  patch: "A click takes what is smooth around that place.",
   brush: "Drag over the surface. Drag beside the part, or with the right button, to turn the view.",
 } as const;
 
 type Tool = keyof typeof TOOLS;
 
 export class Setup {
-  private role: number = Role.HELD;
+  private role: number | null = null; // that a click gives; null: it asks
   private tool: Tool = "face";
+  private asked: number[] = []; // triangles that a click would take, while the page asks what they shall be
+  private readonly history = new PickHistory();
+  private readonly form: PartForm;
   private readonly first: Uint8Array;
   private pressed: { x: number; y: number; id: number; painting: boolean } | null = null;
   private spreads = { patch: 35, brush: 0 }; // degrees, m
@@ -28,24 +36,45 @@ export class Setup {
     private readonly view: PartView,
     private readonly facts: PartFacts,
     private readonly start: (wish: StartWish, held: number[] | null, touched: number[] | null) => void,
+    judge: (wish: StartWish) => void,
     private readonly another: (unit: string) => void,
   ) {
     this.first = view.roles.slice();
     this.spreads.brush = 0.06 * view.extent;
     if (facts.faces.length < 2 && !facts.whole) this.tool = "patch"; // one smooth face is all of the part
     this.describe();
-    this.form();
+    this.form = new PartForm(facts, judge);
+    element("start").addEventListener("click", () => this.begin());
     this.buttons();
     this.pointers();
+    this.keys();
     this.show();
   }
 
-  /** Say what does not fit; nothing where all does. */
-  answer(problem: string): void {
+  /** Say what does not fit, of the whole and of single fields; nothing where all does. */
+  answer(problem: string, fields: Record<string, string> | null): void {
+    const starting = this.starting;
+    this.starting = false;
+    if (fields) this.form.say(fields, starting);
+    if (!starting && !problem) return;
     element("problem").hidden = !problem;
     element("problem").textContent = problem;
-    element<HTMLButtonElement>("start").disabled = false;
     if (problem) element("problem").scrollIntoView({ block: "nearest" });
+    this.ready();
+  }
+
+  /** Let the work be started, or not while there is no server. */
+  set connected(on: boolean) {
+    this.served = on;
+    if (!on) this.starting = false;
+    this.ready();
+  }
+
+  private starting = false;
+  private served = true;
+
+  private ready(): void {
+    element<HTMLButtonElement>("start").disabled = this.starting || !this.served;
   }
 
   private describe(): void {
@@ -102,58 +131,21 @@ export class Setup {
     return left > 0 ? [...rows, worded("li", `and ${left} smaller ones`)] : rows;
   }
 
-  private form(): void {
-    const { facts } = this;
-    const { choices } = facts as unknown as { choices: StartWish };
-    const material = element<HTMLSelectElement>("material");
-    const own = new Option("own: law and numbers", "");
-    material.replaceChildren(own, ...facts.materials.map(({ name }) => new Option(name, name)));
-    element<HTMLSelectElement>("law").replaceChildren(...facts.laws.map((law) => new Option(law, law)));
-    material.value = choices.material;
-    element<HTMLSelectElement>("law").value = choices.law;
-    input("young").value = choices.young;
-    input("poisson").value = choices.poisson;
-    input("ball-radius").value = choices.radius;
-    input("ball-depth").value = choices.depth;
-    const told = (): void => {
-      const known = facts.materials.find(({ name }) => name === material.value);
-      for (const part of document.querySelectorAll<HTMLElement>(".own")) part.hidden = known !== undefined;
-      element("material-about").textContent = known?.about ?? "";
-    };
-    material.addEventListener("input", told);
-    told();
-    const drawn = (): void => void (input("ball-radius").dataset["metres"] = String(lengthOf(input("ball-radius").value)));
-    input("ball-radius").addEventListener("input", drawn);
-    drawn();
-    element("start").addEventListener("click", () => this.begin());
-  }
-
   private begin(): void {
-    const value = (id: string): string => element<HTMLInputElement | HTMLSelectElement>(id).value;
-    element<HTMLButtonElement>("start").disabled = true;
+    this.starting = true;
+    this.ready();
     element("problem").hidden = true;
     const { roles } = this.view;
     const changed = roles.some((role, t) => role !== this.first[t]);
     const chosen = (role: number): number[] => [...roles.keys()].filter((t) => roles[t] === role);
-    this.start(
-      {
-        material: value("material"),
-        law: value("law"),
-        young: value("young"),
-        poisson: value("poisson"),
-        radius: value("ball-radius"),
-        depth: value("ball-depth"),
-      },
-      changed ? chosen(Role.HELD) : null,
-      changed ? chosen(Role.TOUCHED) : null,
-    );
+    this.start(this.form.wish(false), changed ? chosen(Role.HELD) : null, changed ? chosen(Role.TOUCHED) : null);
   }
 
   private buttons(): void {
     for (const button of document.querySelectorAll<HTMLButtonElement>("#roles button")) {
       button.addEventListener("click", () => {
-        this.role = Number(button.dataset["role"]);
-        this.show();
+        const role = Number(button.dataset["role"]);
+        this.arm(role === this.role ? null : role);
       });
     }
     for (const button of document.querySelectorAll<HTMLButtonElement>("#picks button")) {
@@ -167,18 +159,85 @@ export class Setup {
       const take = button.dataset["take"] as "up" | "low" | "rest" | "reset";
       button.hidden = this.facts.whole && (take === "up" || take === "low");
       button.addEventListener("click", () => {
-        if (take === "reset") this.view.roles.set(this.first);
-        this.assign(take === "reset" ? [] : this.view.all(take), this.role);
+        if (take === "reset") this.become(this.first);
+        else this.give(this.view.all(take));
       });
     }
+    for (const button of document.querySelectorAll<HTMLButtonElement>("#ask button")) {
+      button.addEventListener("click", () => {
+        const [taken, role] = [this.asked, Number(button.dataset["role"])];
+        this.arm(role);
+        this.assign(taken, role);
+      });
+    }
+    element("undo").addEventListener("click", () => this.turn(true));
+    element("redo").addEventListener("click", () => this.turn(false));
     input("spread").addEventListener("input", () => {
       if (this.tool !== "face") this.spreads[this.tool] = input("spread").valueAsNumber;
       this.label();
     });
   }
 
+  private keys(): void {
+    document.addEventListener("keydown", (e) => {
+      if (document.documentElement.dataset["stage"] !== "choosing") return;
+      if (e.key === "Escape") this.arm(null);
+      const writing = e.target instanceof HTMLInputElement && e.target.type === "text"; // there it undoes letters
+      if (writing || !(e.ctrlKey || e.metaKey)) return;
+      const key = e.key.toLowerCase();
+      if (key !== "z" && key !== "y") return;
+      e.preventDefault();
+      this.turn(key === "z" && !e.shiftKey);
+    });
+  }
+
+  /** Choose the role that a click gives; without one it asks. */
+  private arm(role: number | null): void {
+    this.role = role;
+    this.ask([]);
+    this.show();
+  }
+
+  /** Give triangles the chosen role, or ask for one: where none is chosen, or they have it all already. */
+  private give(triangles: readonly number[]): void {
+    const { role } = this;
+    if (role === null || triangles.every((t) => this.view.roles[t] === role)) this.ask(triangles);
+    else this.assign(triangles, role);
+  }
+
+  /** Ask what triangles shall be; of none, stop asking. */
+  private ask(triangles: readonly number[]): void {
+    this.asked = [...triangles];
+    this.view.ask(this.asked);
+    element("ask").hidden = triangles.length === 0;
+    const roles = new Set(triangles.map((t) => this.view.roles[t]!));
+    const now = roles.size === 1 ? ROLES[[...roles][0]!]! : "in part";
+    const words = now === "in part" ? "held or touched in part" : now === "neither" ? "neither held nor touched" : now;
+    element("ask-words").textContent = `This place is ${words}. What shall it be?`;
+    for (const button of document.querySelectorAll<HTMLElement>("#ask button")) {
+      button.hidden = ROLES[Number(button.dataset["role"])] === now;
+    }
+  }
+
   private assign(triangles: readonly number[], role: number): void {
+    this.ask([]);
+    this.history.keep(this.view.roles);
     this.view.assign(triangles, role);
+    this.history.settle(this.view.roles);
+    this.show();
+  }
+
+  private turn(back: boolean): void {
+    const roles = this.history.turn(back, this.view.roles);
+    if (roles) this.become(roles, false);
+  }
+
+  private become(roles: Uint8Array, step = true): void {
+    this.ask([]);
+    if (step) this.history.keep(this.view.roles);
+    this.view.roles.set(roles);
+    this.view.assign([], Role.FREE);
+    if (step) this.history.settle(this.view.roles);
     this.show();
   }
 
@@ -191,7 +250,10 @@ export class Setup {
       button.setAttribute("aria-pressed", String(button.dataset["tool"] === tool));
     }
     element("spread-row").hidden = tool === "face";
-    element("pick-help").textContent = TOOLS[tool];
+    const first = this.role === null ? "Choose first what a click makes of the surface; without that it asks. " : "";
+    element("pick-help").textContent = first + TOOLS[tool];
+    const { back, forth } = this.history.steps;
+    [element<HTMLButtonElement>("undo").disabled, element<HTMLButtonElement>("redo").disabled] = [!back, !forth];
     const spread = input("spread");
     [spread.min, spread.max] = tool === "patch" ? ["1", "90"] : [String(0.01 * view.extent), String(0.2 * view.extent)];
     if (tool !== "face") spread.valueAsNumber = this.spreads[tool];
@@ -219,7 +281,7 @@ export class Setup {
       const at = this.pressed && !this.pressed.painting ? null : view.pointed(e.offsetX, e.offsetY);
       if (this.pressed?.painting && e.pointerId === this.pressed.id && at) this.paint(at);
       canvas.dataset["cursor"] = at ? "pick" : "";
-      if (e.pointerType !== "touch") view.ball(this.tool === "brush" ? null : at, lengthOf(input("ball-radius").value));
+      if (e.pointerType !== "touch") view.ball(this.tool === "brush" ? null : at, this.form.radius);
     });
     canvas.addEventListener("pointerleave", () => view.ball(null, 0));
     for (const kind of ["pointerup", "pointercancel"] as const) {
@@ -230,11 +292,13 @@ export class Setup {
   private down(e: PointerEvent): void {
     if (e.button !== 0 || this.pressed) return;
     const at = this.view.pointed(e.offsetX, e.offsetY);
-    const painting = this.tool === "brush" && at !== null;
+    const painting = this.tool === "brush" && at !== null && this.role !== null;
     this.view.brushing = painting; // before the view's own handlers hear of it
     this.pressed = { x: e.offsetX, y: e.offsetY, id: e.pointerId, painting };
     if (!painting) return;
     this.canvas.setPointerCapture(e.pointerId);
+    this.ask([]);
+    this.history.keep(this.view.roles);
     this.paint(at!);
   }
 
@@ -244,24 +308,24 @@ export class Setup {
     this.pressed = null;
     this.view.brushing = false;
     if (pressed.painting) {
+      this.history.settle(this.view.roles);
       this.show();
       return;
     }
     if (!clicked || Math.hypot(e.offsetX - pressed.x, e.offsetY - pressed.y) > CLICK) return;
     const at = this.view.pointed(e.offsetX, e.offsetY);
-    if (at) this.pick(at);
+    if (at) this.give(this.taken(at));
+    else this.ask([]);
   }
 
-  /** Take a face or a patch, or give it back where it is taken already. */
-  private pick(at: Pointed): void {
-    const { view } = this;
-    const taken = this.tool === "face" ? view.face(at.triangle) : view.patch(at.triangle, this.spreads.patch);
-    const back = taken.every((t) => view.roles[t] === this.role);
-    this.assign(taken, back ? Role.FREE : this.role);
+  /** The triangles that a click takes. */
+  private taken(at: Pointed): number[] {
+    if (this.tool === "brush") return this.view.near(at, this.spreads.brush);
+    return this.tool === "face" ? this.view.face(at.triangle) : this.view.patch(at.triangle, this.spreads.patch);
   }
 
   private paint(at: Pointed): void {
-    this.view.assign(this.view.near(at, this.spreads.brush), this.role);
+    if (this.role !== null) this.view.assign(this.view.near(at, this.spreads.brush), this.role);
   }
 }
 

@@ -51,6 +51,8 @@ def test_the_card_goes_out(export: Callable[[Surrogate, Path], tuple[str, str]],
     assert (card["author"], card["licence"]) == ("A. Author </script>", "CC-BY-4.0")
     named = {name: value for name, value in card["hashes"].items() if name.startswith("weights")}
     assert list(named.values()) == [weights]
+    # whoever couples the body must know that it has no mass
+    assert any(limit.startswith("Quasi-static:") and "mass and damping" in limit for limit in card["limits"])
 
 
 def test_the_card_says_of_which_weights_the_hash_is(tmp_path: Path):

@@ -24,6 +24,10 @@ __all__ = ["FORMAT_VERSION", "NOT_STATED", "ModelCard", "card_of"]
 
 FORMAT_VERSION = 1  # version of the card's own layout
 NOT_STATED = "not stated"
+QUASI_STATIC = (
+    "Quasi-static: each answer is a static equilibrium, without mass or inertia. A simulation that couples the body gives "
+    "mass and damping to what touches it, and no vibration or impact of the body itself is in the force."
+)
 
 
 @dataclass(frozen=True)
@@ -223,6 +227,7 @@ def _limits_of(body: Any, meta: Mapping[str, Any]) -> list[str]:
     known = "say" if body.energy.root is not None else "do not say"
     limits.append(f"The answers {known} how far the force may be off from place to place.")
     remembers = "Elastic: a force depends on the place alone, not on what came before."
+    limits.append(QUASI_STATIC)
     limits.append(remembers if body.memory is None else f"It remembers: {body.memory}.")
     runtime = _record(meta.get("runtime"))
     if runtime.get("max_force"):

@@ -63,7 +63,7 @@ def chosen_part(folder: Path) -> Iterator[str]:
 @contextmanager
 def solved_part(folder: Path) -> Iterator[str]:
     with part(folder) as page:
-        page.show_progress(Progress("solve 7 of 12", solves=7))
+        page.show_progress(Progress("7 of 12 first solves", remaining=48.0, share=0.4, seconds=31.0))
         yield page.url
 
 
@@ -73,7 +73,8 @@ def learnt_part(folder: Path) -> Iterator[str]:
     report.write_text("<p>A report.</p>", encoding="utf-8")
     with part(folder) as page:
         page.show_body(touched_slab().save(folder / "pad.palpate"))
-        page.show_progress(Progress("learning", 12, 0.02, 0.008, 0.031, np.zeros((1, 3)), 41.0, report))
+        words = "12 of 12 first solves; learning"
+        page.show_progress(Progress(words, 12, 0.02, 0.008, 0.031, np.zeros((1, 3)), 41.0, report, 20.0, 0.6))
         yield page.url
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -281,18 +282,22 @@ def versions(tmp_path: Path) -> list[Path]:
 def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, tmp_path, keep):
     places = np.array([[0.0, 0.0, 0.02], [0.005, 0.005, 0.02]])
     server.show_part(shown_part(study))
-    server.show_progress(Progress("solve 2 of 12", solves=2, places=places))
+    server.show_progress(Progress("2 of 12 first solves", places=places, remaining=50.0, share=0.25))
     page.wait_for_selector("html[data-learning][data-partdrawn]")
-    assert page.inner_text("#phase") == "solve 2 of 12"
+    assert page.inner_text("#phase") == "2 of 12 first solves"
+    assert re.fullmatch(r", about (50|45|40|35|30) s", page.inner_text("#remaining"))
+    assert 0.25 <= page.evaluate("document.getElementById('work-share').value") < 0.9
+    assert page.is_hidden("#error-median"), "nothing is said of an error before there is one"
     keep(page, "part-solving")
     report = tmp_path / "slab.html"
     report.write_text("<p>A report.</p>", encoding="utf-8")
-    first = Progress("learning", 12, 0.02, 0.008, 0.031, places, 41.0, report)
+    first = Progress("12 of 12 first solves; learning", 12, 0.02, 0.008, 0.031, places, 41.0, report, 0.5)
     server.show_body(versions[0])
     server.show_progress(first)
     page.wait_for_selector("html[data-touching='1'][data-tick][data-middle]")
     assert page.inner_text("#error-p95") == "3.1"
     assert 41 <= int(page.inner_text("#elapsed").split()[0]) < 60
+    page.wait_for_function("document.getElementById('remaining').textContent === ', a little longer'")
 
     assert page.get_attribute("#trust-toggle", "aria-pressed") == "true"
     assert page.inner_text("#legend-title") == "uncertainty of the force (%)"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import queue
 import subprocess
 import sys
@@ -18,6 +19,7 @@ import numpy as np
 
 from palpate.cli.console import Console
 from palpate.cli.improvement_lines import step_line
+from palpate.cli.work_estimate import WorkEstimate
 from palpate.errors import PalpateError, UsageError
 from palpate.format import duration
 from palpate.processes import helper_environment, kill_group
@@ -86,6 +88,7 @@ class TouchedPart:
         self.times: dict[str, float] = {}
         self._made = time.monotonic()
         self._progress = Progress("starting", target=until)
+        self._estimate = WorkEstimate()
         self._work = _Work()
         self._warm_up = WarmUp("pressed", "loop")  # beside choosing, solving and learning
         self._stopped, self._begun, self._beginning = False, False, threading.Lock()
@@ -141,7 +144,7 @@ class TouchedPart:
             "log": self._log,
             "progress": self._count,
             "step": self._step,
-            "body": self._bodies.put,
+            "body": self._take_body,
             "ended": self._end,
             "failed": self._fail,
         }
@@ -157,23 +160,31 @@ class TouchedPart:
 
     def _show(self, **changes: Any) -> None:
         began = self._made + self.times.get("start", 0.0)
-        known = vars(self._progress) | {"seconds": time.monotonic() - began} | changes
+        work = self._estimate
+        now = {"phase": work.words, "remaining": work.remaining, "share": work.share}
+        known = vars(self._progress) | {"seconds": time.monotonic() - began} | now | changes
         self._progress = Progress(**known)
         self.page.show_progress(self._progress)
 
     def _log(self, words: str) -> None:
-        self._phase = words
-        self._show(phase=words)
+        self._estimate.begin(words)
+        self._show()
         self.console.say(f"{words} …")
 
-    _phase = "starting"
-
     def _count(self, progress: list[int]) -> None:
-        done, total = progress
-        self._show(phase=f"{self._phase}: {done} of {total}")
+        self._estimate.count_solves(*progress)
+        self._show()
+
+    def _take_body(self, path: str) -> None:
+        self._estimate.end_round()
+        self._bodies.put(path)
 
     def _step(self, figures: dict[str, Any]) -> None:
         step = SimpleNamespace(**figures)
+        if step.phase == "solved":
+            self._estimate.learn()
+        elif step.phase == "learnt" and not step.is_new:
+            self._estimate.end_round()  # a new one comes as a body
         if step.phase in {"learnt", "judged"}:
             self.console.say(step_line(step))
         places = np.array(step.places, dtype=float).reshape(-1, 3)
@@ -182,7 +193,7 @@ class TouchedPart:
     def _end(self, outcome: dict[str, Any]) -> None:
         self.mark("end")
         report = outcome["report"] or None
-        self._show(phase="done", report=report)
+        self._show(phase="done", report=report, remaining=math.nan, share=1.0)
         reached = "The wanted force error is kept." if outcome["reached"] else outcome["reason"]
         self.page.end(f"{reached} Everything is kept beside the part; the same command goes on.")
         self.console.say(outcome.get("validation") or outcome["reason"])

@@ -197,3 +197,5 @@ class LearningProgress(Json):
     places: tuple[Vec3, ...]  # (k, 3) places on the surface where solves are done, m
     seconds: float  # time since the start, s
     report: bool  # whether there is a report at ``/report``
+    remaining: float | None  # estimated time until the next surrogate, s; null where it is not known
+    share: float  # of the way to the next surrogate that is done, 0 to 1

@@ -74,7 +74,7 @@ class Progress:
     Attributes
     ----------
     phase : str
-        What goes on, in words: ``"meshing"``, ``"solve 7 of 12"``, ``"learning from 12 solves"``.
+        What goes on, in words: ``"meshing"``, ``"7 of 12 first solves"``, ``"12 of 12 first solves; learning"``.
     solves : int
         Solves that are done.
     target : float
@@ -87,6 +87,10 @@ class Progress:
         Time since the start, s.
     report : path, optional
         The report, once there is one.
+    remaining : float
+        Estimated time until the next surrogate, s; not-a-number where it is not known.
+    share : float
+        Share of the way to the next surrogate that is done, 0 to 1.
     """
 
     phase: str
@@ -97,6 +101,8 @@ class Progress:
     places: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     seconds: float = 0.0
     report: str | os.PathLike[str] | None = None
+    remaining: float = float("nan")
+    share: float = 0.0
 
 
 @dataclass(eq=False)
@@ -373,8 +379,9 @@ class PartPage(LocalServer):
         places = np.asarray(progress.places, dtype=float).reshape(-1, 3)
         if self._part is not None:
             places = on_surface(self._part, places)
-        median, p95 = (
-            float(e) if np.isfinite(e) else None for e in (progress.error_median, progress.error_p95)
+        median, p95, remaining = (
+            float(number) if np.isfinite(number) else None
+            for number in (progress.error_median, progress.error_p95, progress.remaining)
         )
         return LearningProgress(
             phase=progress.phase,
@@ -385,6 +392,8 @@ class PartPage(LocalServer):
             places=tuple((x, y, z) for x, y, z in places.tolist()),
             seconds=progress.seconds,
             report=progress.report is not None,
+            remaining=remaining,
+            share=progress.share,
         )
 
     def _turn(self, stage: str, words: str) -> None:

@@ -1,4 +1,4 @@
-// How far solves and learning are: phase, error against unseen solves, target, time; and the wish that they end.
+// How far solves and learning are: phase, time left, error against unseen solves, target; and the wish that they end.
 
 import type { LearningProgress } from "./messages";
 import { element, share, tidy } from "./units";
@@ -36,6 +36,7 @@ export class Learning {
     this.ended = true;
     element("enough").hidden = true;
     if (words) element("phase").textContent = words;
+    element("work-share").hidden = true;
     this.clock();
   }
 
@@ -61,12 +62,26 @@ export class Learning {
     this.shown = error;
   }
 
+  /** The time that has passed, and the time that is left, both going on between two messages. */
   private clock(): void {
-    if (!this.latest) return;
-    const passed = this.latest.seconds + (this.ended ? 0 : (performance.now() - this.since) / 1000);
+    const { latest } = this;
+    if (!latest) return;
+    const since = this.ended ? 0 : (performance.now() - this.since) / 1000;
+    const left = latest.remaining === null || this.ended ? null : Math.max(0, latest.remaining - since);
+    element("remaining").textContent = left === null ? "" : left < 1 ? ", a little longer" : `, about ${roughly(left)}`;
+    const rest = latest.remaining === null ? 0 : Math.min(since / Math.max(latest.remaining, 1), 1);
+    element<HTMLProgressElement>("work-share").value = latest.share + (0.98 - latest.share) * rest;
+    const passed = latest.seconds + since;
     const [minutes, seconds] = [Math.floor(passed / 60), Math.floor(passed % 60)];
     element("elapsed").textContent = `${minutes ? `${minutes} min ` : ""}${seconds} s since the start`;
   }
+}
+
+/** A time as one says it: 4 s, 20 s, 2 min. */
+function roughly(seconds: number): string {
+  if (seconds < 10) return `${Math.ceil(seconds)} s`;
+  if (seconds < 90) return `${5 * Math.round(seconds / 5)} s`;
+  return `${Math.round(seconds / 60)} min`;
 }
 
 let fading = 0;

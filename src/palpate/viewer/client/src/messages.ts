@@ -203,6 +203,8 @@ export interface LearningProgress {
   places: Vec3[];
   seconds: number;
   report: boolean;
+  remaining: number | null;
+  share: number;
 }
 
 export function isHello(message: { kind: string }): message is Hello & { kind: string } {

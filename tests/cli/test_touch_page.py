@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import re
 import signal
@@ -23,6 +24,7 @@ from websockets.sync.client import connect
 
 import pressed
 from palpate.cli.console import Console
+from palpate.cli.improvement_lines import trial_in_words
 from palpate.cli.touch_page import TouchedPart
 from palpate.errors import UsageError
 from palpate.runtime import warm_up
@@ -47,19 +49,14 @@ class Improvement:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.studies: list[tuple[str, object, object]] = []
         self.ended: list[str] = []
+        self.phases = [("solved", 12), ("learnt", 12), ("solved", 16), ("learnt", 16), ("ended", 16)]
         monkeypatch.setattr("palpate.study.improve_study.improve_study", self)
         monkeypatch.setattr("palpate.sweeps.local_cluster", contextlib.nullcontext)
 
     def __call__(self, study: Study, paths: Paths, *, cluster: object, **options: object):
         self.studies.append((study.name, cluster, study.sweep.element))
         try:
-            for phase, solves in (
-                ("solved", 12),
-                ("learnt", 12),
-                ("solved", 16),
-                ("learnt", 16),
-                ("ended", 16),
-            ):
+            for phase, solves in self.phases:
                 yield self.step(study, paths, phase, solves)
         finally:
             self.ended.append(study.name)
@@ -73,8 +70,8 @@ class Improvement:
         return SimpleNamespace(
             phase=phase, solves=solves, unseen=0, error=float("nan"), median=float("nan"), seconds=1.0, is_new=is_new,
             reached=False, reason="The time is over." * (phase == "ended"), places=np.zeros((solves, 3)),
-            train=pressed.dataset(pressed.solves()), surrogate=pressed.surrogate() if paths.model.exists() else None,
-            model_path=paths.model if paths.model.exists() else None,
+            train=pressed.dataset(pressed.solves()), test=pressed.dataset(pressed.solves()), surrogate=pressed.surrogate() if paths.model.exists() else None,
+            model_path=paths.model if paths.model.exists() else None, before=math.nan, tried=math.nan,
         )  # fmt: skip
 
 
@@ -108,6 +105,34 @@ def test_the_studys_first_solves_tell_the_error_of_the_rough_surrogate(study, tm
     (tmp_path / "pad.palpate").unlink()
     again = [line["step"] for line in carried_out(study, tmp_path) if "step" in line]
     assert again[0]["error"] == pytest.approx(0.1)
+
+
+def test_the_studys_own_surrogate_is_compared_with_the_rough_one_on_the_same_solves(
+    study, tmp_path, monkeypatch
+):
+    work = Improvement(monkeypatch)
+    work.phases.insert(2, ("judged", 12))
+    (step,) = (
+        line["step"]
+        for line in carried_out(study, tmp_path)
+        if "step" in line and line["step"]["phase"] == "judged"
+    )
+    assert step["before"] == pytest.approx(0.1), "the rough one is a tenth too stiff"
+    assert step["is_new"], "the study's own is in the hand, whichever is better"
+
+
+@pytest.mark.parametrize(
+    ("is_new", "before", "tried", "words"),
+    [
+        (True, 0.03, 0.027, "improved: 3 % → 2.7 % on the same 20 unseen solves"),
+        (True, 0.027, 0.0275, "replaced: 2.7 % → 2.75 % on the same 20 unseen solves"),
+        (False, 0.027, 0.03, "kept, since a new one has 3 %, not 2.7 %, on the same 20 unseen solves"),
+        (True, math.nan, 0.03, ""),
+    ],
+)
+def test_a_new_surrogate_is_told_beside_the_one_before(is_new, before, tried, words):
+    step = SimpleNamespace(is_new=is_new, before=before, tried=tried, unseen=20)
+    assert trial_in_words(step).replace("\N{NO-BREAK SPACE}", " ") == words
 
 
 def test_the_same_command_goes_on_with_what_there_is(study, tmp_path, monkeypatch):

@@ -107,6 +107,9 @@ def test_a_surrogate_that_misses_begins_the_row_anew(improve):
     assert [step.solves for step in learnt] == [12, 16, 20, 24, 28]
     assert not learnt[2].is_new
     assert learnt[2].error == learnt[1].error < 0.9, "the error shown is that of what is kept"
+    assert learnt[2].before == learnt[2].error < learnt[2].tried, "both on the same unseen solves"
+    assert learnt[1].before > learnt[1].tried == learnt[1].error
+    assert np.isnan(learnt[0].before), "nothing was there to compare with"
     assert steps[-1].reached
     assert share(steps[-1].error) in steps[-1].reason
 

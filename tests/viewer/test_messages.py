@@ -96,7 +96,7 @@ FACTS = PartFacts(
     notes=("repaired",),
 )
 LEARNING = LearningProgress(
-    "solving", 12, 0.02, None, 0.03, ((0.0, 1.0, 2.0),), 60.0, report=True, remaining=12.5, share=0.25
+    "solving", 12, 0.02, None, 0.03, "kept", ((0.0, 1.0, 2.0),), 60.0, report=True, remaining=12.5, share=0.25
 )
 PART = (
     PartNews(PROTOCOL, "kidney", "working", "words", 2, 1),

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from palpate.study.run import Outcome, Paths
     from palpate.sweeps import Scheduler
 
-__all__ = ["improve_and_print", "improve_file", "step_line"]
+__all__ = ["improve_and_print", "improve_file", "step_line", "trial_in_words"]
 
 
 def improve_file(
@@ -88,11 +88,22 @@ def step_line(step: Any) -> str:
     """Return the figures of an `ImprovementStep` as a line."""
     if not step.unseen or math.isnan(step.error):
         return f"{count(step.solves, 'solve')}: a first surrogate, not judged yet, after {duration(step.seconds)}"
-    kept = "" if step.is_new or step.phase == "judged" else "; the surrogate before is better and stays"
+    trial = trial_in_words(step)
     return (
         f"{step.solves} solves: force error {share(step.median)} at the median, {share(step.error)} at the 95th "
-        f"percentile of {count(step.unseen, 'unseen solve')}, after {duration(step.seconds)}{kept}"
+        f"percentile of {count(step.unseen, 'unseen solve')}, after {duration(step.seconds)}{trial and f'; {trial}'}"
     )
+
+
+def trial_in_words(step: Any) -> str:
+    """Return how a new surrogate compares with the one before it, and which was kept; "" where none was compared."""
+    if math.isnan(step.before) or math.isnan(step.tried):
+        return ""
+    same = f"on the same {count(step.unseen, 'unseen solve')}"
+    if not step.is_new:
+        return f"kept, since a new one has {share(step.tried)}, not {share(step.before)}, {same}"
+    verb = "improved" if step.tried < step.before else "replaced"
+    return f"{verb}: {share(step.before)} → {share(step.tried)} {same}"
 
 
 def _failure(study: Study, until: float, last: ImprovementStep) -> AccuracyError:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from palpate.cli.console import Console
-from palpate.cli.improvement_lines import step_line
+from palpate.cli.improvement_lines import step_line, trial_in_words
 from palpate.cli.work_estimate import WorkEstimate
 from palpate.errors import PalpateError, UsageError
 from palpate.format import duration
@@ -188,7 +188,13 @@ class TouchedPart:
         if step.phase in {"learnt", "judged"}:
             self.console.say(step_line(step))
         places = np.array(step.places, dtype=float).reshape(-1, 3)
-        self._show(solves=step.solves, error_median=step.median, error_p95=step.error, places=places)
+        known = {
+            "solves": step.solves,
+            "error_median": step.median,
+            "error_p95": step.error,
+            "places": places,
+        }
+        self._show(**known, trial=trial_in_words(step) or self._progress.trial)
 
     def _end(self, outcome: dict[str, Any]) -> None:
         self.mark("end")

@@ -87,7 +87,10 @@ class ImprovementStep:
     history : optional
         Record of the learning of the surrogate.
     is_new : bool
-        Whether this step has brought a surrogate that is better than the last one.
+        Whether this step has brought a surrogate that takes the place of the last one.
+    before, tried : float
+        Where a surrogate was learnt beside an earlier one: the error of the earlier and that of the new one, both on
+        the same unseen solves, at the 95th percentile; else not-a-number. The new one was kept where `is_new` says so.
     reached : bool
         Whether the wanted error is kept.
     reason : str
@@ -112,6 +115,8 @@ class ImprovementStep:
     reached: bool = False
     reason: str = ""
     model_path: Path | None = None
+    before: float = math.nan
+    tried: float = math.nan
 
 
 @takes(ImprovementOptions)
@@ -256,8 +261,8 @@ class _Improvement:
             more = len(self.unseen) if below else min(len(self.judging) + UNSEEN_EACH, len(self.unseen))
             self._judge_by(more)
             yield self._step("solved")
-            is_new = self._learn_and_judge()
-            yield self._step("learnt", is_new=is_new)
+            before, tried, is_new = self._learn_and_judge()
+            yield replace(self._step("learnt", is_new=is_new), before=before, tried=tried)
         reached = self.stop.is_reached(self.errors, complete=self._is_complete)
         yield replace(self._step("ended"), reached=reached, reason=reason)
 
@@ -378,8 +383,11 @@ class _Improvement:
         if errors is not None and len(errors) == len(touching):
             self.values[touching] = errors
 
-    def _learn_and_judge(self) -> bool:
-        """Learn from all solves, keep the better of the new and the last surrogate, and return whether it's new."""
+    def _learn_and_judge(self) -> tuple[float, float, bool]:
+        """Learn from all solves, and keep the better of the new and the last surrogate.
+
+        Returns the error of the last and of the new one on the same unseen solves, and whether the new one is kept.
+        """
         near = self.error <= NEAR * self.stop.until
         result = self._learn(PROPER if near else QUICK)
         error, before = self._error(result), self._error(self.best)
@@ -392,7 +400,7 @@ class _Improvement:
             self._take(result)
         self.errors.append(error)  # its own: one lucky surrogate, kept after a miss, would count as two
         self.error = error if is_new else before
-        return is_new
+        return before, error, is_new
 
     def _error(self, result: tuple[Surrogate, Any] | None) -> float:
         assert result is not None

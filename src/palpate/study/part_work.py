@@ -84,14 +84,18 @@ def work_on(
 
     began = time.monotonic()
     rough = rough_study(study)
-    known = _find_surrogate(study, paths)
-    if known is None and rough is not None:
-        known = _find_surrogate(rough, Paths(paths.folder, rough.name))
-    if known is not None:
-        say({"body": str(known)})
+    in_hand: Path | None = None  # a rough surrogate
+    if (own := _find_surrogate(study, paths)) is not None:
+        say({"body": str(own)})
     elif rough is not None:
-        with local_cluster(workers) as cluster:
-            known = _first_touch(rough.with_workers(workers), Paths(paths.folder, rough.name), cluster, say)
+        in_hand = _find_surrogate(rough, Paths(paths.folder, rough.name))
+        if in_hand is not None:
+            say({"body": str(in_hand)})
+        else:
+            with local_cluster(workers) as cluster:
+                in_hand = _first_touch(
+                    rough.with_workers(workers), Paths(paths.folder, rough.name), cluster, say
+                )
     if stopped():
         say(
             {
@@ -113,7 +117,7 @@ def work_on(
             cluster=cluster,
             **_callbacks(say),
         )
-        _carry_out(study, paths, steps, say, stopped, known)
+        _carry_out(study, paths, steps, say, stopped, in_hand)
 
 
 def _find_surrogate(study: Study, paths: Paths) -> Path | None:
@@ -148,17 +152,21 @@ def _first_touch(rough: Study, paths: Paths, cluster: Any, say: Say) -> Path | N
 
 
 def _errors_of(rough: Path | None, step: Any) -> dict[str, float]:
-    """Return the force error of the surrogate in the hand, while the study has none of its own yet.
+    """Return the force error of a rough surrogate in the hand, until the study's own is judged beside it.
 
     It was learnt on other elements: all solves of the study are unseen to it.
     """
     from palpate.improvement.stop_rule import relative_errors
     from palpate.surrogates import Surrogate
 
-    if rough is None or step.surrogate is not None or step.train is None:
+    judged = step.phase == "judged"
+    data = step.test if judged else step.train
+    if rough is None or data is None or (step.surrogate is not None and not judged):
         return {}
-    errors = relative_errors(Surrogate.load(rough), step.train)
+    errors = relative_errors(Surrogate.load(rough), data)
     median, p95 = np.quantile(errors, (0.5, 0.95)) if errors.size else (math.nan, math.nan)
+    if judged:
+        return {"before": float(p95), "tried": step.error, "is_new": True}
     return {"error": float(p95), "median": float(median)}
 
 
@@ -196,6 +204,7 @@ def _carry_out(
 
 def _figures(step: Any) -> dict[str, Any]:
     names = ("phase", "solves", "unseen", "error", "median", "seconds", "is_new", "reached", "reason")
+    names += ("before", "tried")
     return {name: getattr(step, name) for name in names} | {"places": step.places.tolist()}
 
 

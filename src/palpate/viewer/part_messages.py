@@ -194,6 +194,7 @@ class LearningProgress(Json):
     # relative force error against solves that were kept apart; null before the first body
     error_median: float | None
     error_p95: float | None  # 95th percentile of the same
+    trial: str  # the latest body beside the one before it, on the same solves, in words; empty for none
     places: tuple[Vec3, ...]  # (k, 3) places on the surface where solves are done, m
     seconds: float  # time since the start, s
     report: bool  # whether there is a report at ``/report``

@@ -81,6 +81,8 @@ class Progress:
         Relative force error at the 95th percentile that ends the work.
     error_median, error_p95 : float
         Relative force error against solves kept apart, of the body shown; not-a-number before the first.
+    trial : str
+        The latest surrogate beside the one before it, on the same solves, in words: which was kept, and both errors.
     places : (k, 3) array
         Places of the solves that are done, m: contact points on the surface, or centres of the ball.
     seconds : float
@@ -98,6 +100,7 @@ class Progress:
     target: float = 0.02
     error_median: float = float("nan")
     error_p95: float = float("nan")
+    trial: str = ""
     places: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     seconds: float = 0.0
     report: str | os.PathLike[str] | None = None
@@ -389,6 +392,7 @@ class PartPage(LocalServer):
             target=progress.target,
             error_median=median,
             error_p95=p95,
+            trial=progress.trial,
             places=tuple((x, y, z) for x, y, z in places.tolist()),
             seconds=progress.seconds,
             report=progress.report is not None,

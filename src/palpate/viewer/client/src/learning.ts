@@ -8,7 +8,7 @@ const TOAST = 6000; // ms that an improvement is shown on the picture
 export class Learning {
   private latest: LearningProgress | null = null;
   private since = 0; // ms, when it came
-  private shown = NaN; // force error of the body that is drawn
+  private trial = ""; // words on the latest body beside the one before it
   private ended = false;
 
   constructor(enough: () => void) {
@@ -46,20 +46,18 @@ export class Learning {
     if (latest.error_p95 === null) {
       element("error-p95").textContent = element("error-median").textContent = "–";
       element("improved").textContent = "not checked yet";
-      this.shown = NaN;
       return;
     }
     const error = latest.error_p95;
     element("error-p95").textContent = tidy(100 * error, 2);
     element("error-median").textContent = latest.error_median === null ? "–" : share(latest.error_median);
-    if (Number.isNaN(this.shown)) element("improved").textContent = "";
-    if (error !== this.shown && !Number.isNaN(this.shown)) {
-      const words = `${error < this.shown ? "improved" : "changed"}: ${share(this.shown)} → ${share(error)}`;
-      element("improved").textContent = words;
-      document.documentElement.dataset["improved"] = words; // for programs that read the page
-      toast(words);
+    // errors alone would not tell: between two bodies they change with the solves that judge
+    element("improved").textContent = latest.trial;
+    if (latest.trial && latest.trial !== this.trial) {
+      document.documentElement.dataset["improved"] = latest.trial; // for programs that read the page
+      toast(latest.trial);
     }
-    this.shown = error;
+    this.trial = latest.trial;
   }
 
   /** The time that has passed, and the time that is left, both going on between two messages. */

@@ -200,6 +200,7 @@ export interface LearningProgress {
   target: number;
   error_median: number | null;
   error_p95: number | null;
+  trial: string;
   places: Vec3[];
   seconds: number;
   report: boolean;

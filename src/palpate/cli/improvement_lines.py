@@ -88,10 +88,10 @@ def step_line(step: Any) -> str:
     """Return the figures of an `ImprovementStep` as a line."""
     if not step.unseen or math.isnan(step.error):
         return f"{count(step.solves, 'solve')}: a first surrogate, not judged yet, after {duration(step.seconds)}"
-    trial = trial_in_words(step)
+    trial = f"; {words}" if (words := trial_in_words(step)) else ""
     return (
         f"{step.solves} solves: force error {share(step.median)} at the median, {share(step.error)} at the 95th "
-        f"percentile of {count(step.unseen, 'unseen solve')}, after {duration(step.seconds)}{trial and f'; {trial}'}"
+        f"percentile of {count(step.unseen, 'unseen solve')}, after {duration(step.seconds)}{trial}"
     )
 
 

@@ -25,8 +25,8 @@ __all__ = ["FORMAT_VERSION", "NOT_STATED", "ModelCard", "card_of"]
 FORMAT_VERSION = 1  # version of the card's own layout
 NOT_STATED = "not stated"
 QUASI_STATIC = (
-    "Quasi-static: each answer is a static equilibrium, without mass or inertia. A simulation that couples the body gives "
-    "mass and damping to what touches it, and no vibration or impact of the body itself is in the force."
+    "Quasi-static: each answer is a static equilibrium, without mass or inertia. A simulation that couples the body "
+    "gives mass and damping to what touches it, and no vibration or impact of the body itself is in the force."
 )
 
 

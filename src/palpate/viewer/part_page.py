@@ -81,8 +81,6 @@ class Progress:
         Relative force error at the 95th percentile that ends the work.
     error_median, error_p95 : float
         Relative force error against solves kept apart, of the body shown; not-a-number before the first.
-    trial : str
-        The latest surrogate beside the one before it, on the same solves, in words: which was kept, and both errors.
     places : (k, 3) array
         Places of the solves that are done, m: contact points on the surface, or centres of the ball.
     seconds : float
@@ -93,6 +91,8 @@ class Progress:
         Estimated time until the next surrogate, s; not-a-number where it is not known.
     share : float
         Share of the way to the next surrogate that is done, 0 to 1.
+    trial : str
+        The latest surrogate beside the one before it, on the same solves, in words: which was kept, and both errors.
     """
 
     phase: str
@@ -100,12 +100,12 @@ class Progress:
     target: float = 0.02
     error_median: float = float("nan")
     error_p95: float = float("nan")
-    trial: str = ""
     places: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     seconds: float = 0.0
     report: str | os.PathLike[str] | None = None
     remaining: float = float("nan")
     share: float = 0.0
+    trial: str = ""
 
 
 @dataclass(eq=False)

@@ -4,7 +4,7 @@
 // it; nothing is taken back by a second click, for which there is *neither*, and undo.
 
 import { Role } from "./messages";
-import type { PartFacts, StartWish } from "./messages";
+import type { Answer, PartFacts, StartWish } from "./messages";
 import { PartForm } from "./part_form";
 import type { PartView, Pointed } from "./part_view";
 import { PickHistory } from "./pick_history";
@@ -52,11 +52,10 @@ export class Setup {
   }
 
   /** Say what does not fit, of the whole and of single fields; nothing where all does. */
-  answer(problem: string, fields: Record<string, string> | null): void {
-    const starting = this.starting;
+  answer({ problem, fields, trial }: Answer): void {
+    if (fields) this.form.say(fields as Record<string, string>, !trial);
+    if (trial) return;
     this.starting = false;
-    if (fields) this.form.say(fields, starting);
-    if (!starting && !problem) return;
     element("problem").hidden = !problem;
     element("problem").textContent = problem;
     if (problem) element("problem").scrollIntoView({ block: "nearest" });

@@ -210,8 +210,9 @@ export class Setup {
     this.view.ask(this.asked);
     element("ask").hidden = triangles.length === 0;
     const roles = new Set(triangles.map((t) => this.view.roles[t]!));
-    const now = roles.size === 1 ? ROLES[[...roles][0]!]! : "in part";
-    const words = now === "in part" ? "held or touched in part" : now === "neither" ? "neither held nor touched" : now;
+    const now = roles.size === 1 ? ROLES[[...roles][0]!]! : ""; // of all of it
+    const some = [Role.HELD, Role.TOUCHED].filter((role) => roles.has(role)).map((role) => ROLES[role]);
+    const words = now === "neither" ? "neither held nor touched" : now || `in part ${some.join(" and in part ")}`;
     element("ask-words").textContent = `This place is ${words}. What shall it be?`;
     for (const button of document.querySelectorAll<HTMLElement>("#ask button")) {
       button.hidden = ROLES[Number(button.dataset["role"])] === now;

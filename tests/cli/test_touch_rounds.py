@@ -52,6 +52,19 @@ def test_it_goes_on_with_the_study_that_init_has_written(palpate, asked, tmp_pat
     assert [path.name for path in tmp_path.glob("*.toml")] == ["left-pad.toml"]
 
 
+def test_one_part_has_several_studies_by_their_names(palpate, asked, tmp_path):
+    part = box(tmp_path / "pad.stl")
+    words = ("touch", part, "--name", "soft", "--tissue", "liver", "--no-view")
+    assert (palpate(*words).code, palpate(*words).code) == (1, 1)
+    assert [study.name for study in asked] == ["soft", "soft"]
+    assert asked[0].body.material == "liver"
+    assert [path.name for path in tmp_path.glob("*.toml")] == ["soft.toml"]
+    other = palpate("touch", part, "--name", "soft", "--material", "kidney", "--no-view")
+    assert other.code == 2
+    assert "It says otherwise of --material." in other.err
+    assert "--name NAME" in other.err
+
+
 @pytest.mark.full
 def test_a_choice_that_does_not_suit_is_no_missed_target(palpate, asked, tmp_path):
     answer = palpate("touch", box(tmp_path / "pad.stl"), "--poisson", "0.7", "--no-view")

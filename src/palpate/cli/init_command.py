@@ -81,9 +81,10 @@ def _init_part(path: Path, choices: PartOptions, preset: str, *, force: bool, sh
         typer.echo(text, nl=False)
         return
     target = study_file(path, study.name)
-    _require_free(target, force=force, other="another name for the study with --name NAME")
-    write_file(target, text)
     named = f" --name {study.name}" if target != study_file(path) else ""
+    way = f"another name with --name NAME, go on with palpate touch {path}{named}"
+    _require_free(target, force=force, other=way)
+    write_file(target, text)
     typer.echo(plain_text(f"{part_line(notes)}\n{target}: a study called {study.name}."))
     typer.echo(plain_text(f"Next: palpate touch {path}{named}, or palpate sweep {target}"))
 

@@ -182,6 +182,7 @@ class Answer(Json):
     problem: str  # of the whole; empty where there is none
     # problems of single choices, by the names of `StartWish`; null: none of them was judged
     fields: Mapping[str, str] | None = None
+    trial: bool = False  # whether the wish was one on trial
 
 
 @dataclass(frozen=True)

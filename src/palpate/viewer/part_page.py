@@ -350,18 +350,21 @@ class PartPage(LocalServer):
         """Carry out a wish of a page that chooses; return what does not fit."""
         unit = '"UnitWish"' in text
         wish = UnitWish.from_json(text) if unit else StartWish.from_json(text)
+        trial = isinstance(wish, StartWish) and wish.trial
         with self._starting:
             if self._part is None or self._stage != "choosing":
+                if trial:
+                    return Answer("", trial=True)
                 return Answer("The work has begun already, by another page." if self._part else "")
             misfits = None if isinstance(wish, UnitWish) else self._part.misfits(wish)
             try:
                 if isinstance(wish, UnitWish):
                     self._take_unit(self._part, wish.unit)
-                elif not (misfits or wish.trial):
+                elif not (misfits or trial):
                     self._start_by(self._part, visitor, wish)
             except PalpateError as error:
                 return Answer(" ".join(filter(None, (error.what, error.why, error.fix))), misfits)
-            return Answer("", misfits)
+            return Answer("", misfits, trial)
 
     def _take_unit(self, part: ShownPart, unit: str) -> None:
         if self._on_unit is not None and unit in part.units:

@@ -90,7 +90,8 @@ class ShownPart:
     @cached_property
     def size(self) -> np.ndarray:
         """Lengths (3,) of the box around it, m."""
-        return np.ptp(np.asarray(self.points, dtype=float)[np.asarray(self.triangles)].reshape(-1, 3), axis=0)
+        corners = np.asarray(self.points, dtype=float)[np.unique(self.triangles)]
+        return np.asarray(np.ptp(corners, axis=0))
 
     def misfits(self, wish: StartWish) -> dict[str, str]:
         """Return what is wrong with numbers of a wish, in sentences by the names of `StartWish`."""

@@ -191,6 +191,7 @@ export interface UnitWish {
 export interface Answer {
   problem: string;
   fields: Record<string, unknown> | null;
+  trial: boolean;
 }
 
 /** The state of solving and learning, server to page. */

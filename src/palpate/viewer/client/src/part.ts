@@ -23,7 +23,7 @@ import { touch } from "./touch";
 import type { Touched } from "./touch";
 import { element, tidy } from "./units";
 
-const GONE = "The server of this page has ended. What is chosen here stays while the page is open: give the command again.";
+const GONE = "The server of this page has ended. Give the command again";
 const PIECE = 900; // triangles in a message: the server takes 4 kB
 const AGAIN = 1000; // ms until a lost connection is tried again
 
@@ -65,7 +65,8 @@ function served(on: boolean): void {
     return;
   }
   status("lost", "disconnected, trying again");
-  say(GONE, "bad");
+  const stays = news?.stage === "choosing" ? "what is chosen here stays while the page is open." : "it goes on where it stopped.";
+  say(`${GONE}: ${stays}`, "bad");
 }
 
 function send(message: string | ArrayBuffer): void {
@@ -74,7 +75,7 @@ function send(message: string | ArrayBuffer): void {
 
 function hear(message: { kind: string }): void {
   if (isPartNews(message)) turn(message);
-  if (isAnswer(message)) setup?.answer(message.problem, message.fields as Record<string, string> | null);
+  if (isAnswer(message)) setup?.answer(message);
   if (!isLearningProgress(message)) return;
   progress = message;
   learning.hear(message);

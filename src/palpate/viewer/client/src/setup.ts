@@ -4,7 +4,7 @@
 // it; nothing is taken back by a second click, for which there is *neither*, and undo.
 
 import { Role } from "./messages";
-import type { PartFacts, StartWish } from "./messages";
+import type { Answer, PartFacts, StartWish } from "./messages";
 import { PartForm } from "./part_form";
 import type { PartView, Pointed } from "./part_view";
 import { PickHistory } from "./pick_history";
@@ -52,11 +52,10 @@ export class Setup {
   }
 
   /** Say what does not fit, of the whole and of single fields; nothing where all does. */
-  answer(problem: string, fields: Record<string, string> | null): void {
-    const starting = this.starting;
+  answer({ problem, fields, trial }: Answer): void {
+    if (fields) this.form.say(fields as Record<string, string>, !trial);
+    if (trial) return;
     this.starting = false;
-    if (fields) this.form.say(fields, starting);
-    if (!starting && !problem) return;
     element("problem").hidden = !problem;
     element("problem").textContent = problem;
     if (problem) element("problem").scrollIntoView({ block: "nearest" });
@@ -211,8 +210,9 @@ export class Setup {
     this.view.ask(this.asked);
     element("ask").hidden = triangles.length === 0;
     const roles = new Set(triangles.map((t) => this.view.roles[t]!));
-    const now = roles.size === 1 ? ROLES[[...roles][0]!]! : "in part";
-    const words = now === "in part" ? "held or touched in part" : now === "neither" ? "neither held nor touched" : now;
+    const now = roles.size === 1 ? ROLES[[...roles][0]!]! : ""; // of all of it
+    const some = [Role.HELD, Role.TOUCHED].filter((role) => roles.has(role)).map((role) => ROLES[role]);
+    const words = now === "neither" ? "neither held nor touched" : now || `in part ${some.join(" and in part ")}`;
     element("ask-words").textContent = `This place is ${words}. What shall it be?`;
     for (const button of document.querySelectorAll<HTMLElement>("#ask button")) {
       button.hidden = ROLES[Number(button.dataset["role"])] === now;

@@ -22,6 +22,7 @@ from palpate.format import (
     script_json,
     share,
     summary_figure,
+    with_interval,
 )
 from palpate.units import Range
 
@@ -32,6 +33,22 @@ UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
 def number(text: str) -> float:
     mantissa, _, exponent = text.partition(" × 10")
     return float(mantissa) * 10.0 ** int(exponent.translate(LOWERED) or 0)
+
+
+@given(st.floats(1e-9, 1e9), st.floats(1e-9, 1.0))
+def test_the_ends_of_an_interval_are_told_apart(value: float, share_of_it: float) -> None:
+    low, high = value * (1 - share_of_it / 2), value * (1 + share_of_it / 2)
+    middle, ends = with_interval(value, low, high).removesuffix(")").split(" (")
+    for text, end in zip(ends.split(" to "), (low, high), strict=True):
+        assert abs(float(text) - end) <= 0.06 * (high - low)
+    assert float(middle) == pytest.approx(value, abs=0.06 * (high - low))
+    if value < 1e5:
+        assert "e+" not in middle + ends
+
+
+def test_an_interval_without_ends_is_told_too() -> None:
+    assert with_interval(10e3, 10e3, 10e3) == "10000 (10000 to 10000)"
+    assert "inf" in with_interval(2.0, 0.0, float("inf"))
 
 
 @given(st.floats(1e-12, 1e12), st.sampled_from([-1.0, 1.0]))

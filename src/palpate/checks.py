@@ -8,7 +8,7 @@
     triple    three numbers along x, y and z
 
 and `own_arrays`, which makes the arrays of a frozen dataclass read-only, and `did_you_mean`, the question that offers
-the nearest choice wherever a name is mistyped.
+the nearest choice wherever a name is mistyped, and `gather`, which tells several refusals at once.
 
 Import the module and name it in the call, ``checks.positive("The radius", radius, "m")``: the verbs alone are too
 common as names. `what` is the quantity's name as a sentence begins with it, with its article; `unit` is the SI unit
@@ -21,14 +21,16 @@ import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from palpate.errors import UsageError
 
 if TYPE_CHECKING:
     import numpy as np
 
-__all__ = ["did_you_mean", "finite", "fits", "one_of", "own_arrays", "positive", "shape", "triple"]
+__all__ = ["did_you_mean", "finite", "fits", "gather", "one_of", "own_arrays", "positive", "shape", "triple"]
+
+T = TypeVar("T")
 
 _SURE = 0.75  # how alike a mistyped word must be to one that merely stands for a choice
 
@@ -106,6 +108,24 @@ def one_of(what: str, value: Any, choices: Sequence[str]) -> str:
         why=f"It is one of {', '.join(map(repr, choices))}.",
         fix=did_you_mean(value, choices, shown=repr, cutoff=0.5) or "Choose one of these.",
     )
+
+
+def gather(calls: Iterable[Callable[[], T]]) -> list[T]:
+    """Return what each call returns; each `UsageError` of theirs is told by one, so that all are mended at once."""
+    results, refused = list[T](), dict[str, UsageError]()  # a refusal of several calls is told once
+    for call in calls:
+        try:
+            results.append(call())
+        except UsageError as error:
+            refused |= {str(part): part for part in error.refusals or (error,)}
+    if len(refused) == 1:
+        raise next(iter(refused.values()))
+    if refused:
+        complaints = [f"{number}. {text}".replace("\n", "\n   ") for number, text in enumerate(refused, 1)]
+        together = UsageError(f"{len(refused)} things are wrong:", why="\n".join(complaints))
+        together.refusals = tuple(refused.values())
+        raise together
+    return results
 
 
 def did_you_mean(

@@ -74,6 +74,7 @@ class UsageError(PalpateError):
     """A wrong argument, name, key, unit or range."""
 
     exit_code = 2
+    refusals: tuple[UsageError, ...] = ()  # where several are told at once
 
 
 class StudyError(UsageError):

@@ -26,6 +26,7 @@ __all__ = [
     "share",
     "span",
     "summary_figure",
+    "with_interval",
 ]
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -152,6 +153,22 @@ _LEFT_OUT = ("median", "p95")  # statistics of the force errors on solves left o
 def number(value: float, digits: int = 4) -> str:
     """Write a number with `digits` digits at most: 0.05, 1e+04; what rounds to zero has no sign."""
     return f"{value + 0.0:.{digits}g}"
+
+
+def with_interval(value: float, low: float, high: float) -> str:
+    """Write a value with its interval, with the digits that tell its ends apart: 1999.9 (1999.6 to 2000.2)."""
+    size = max(abs(value), abs(low), abs(high))
+    digits = 3
+    if math.isfinite(size) and high > low:
+        digits = min(15, max(3, _order(size) - _order(high - low) + 2))
+    if 0.0 < size < 1e6:  # no exponent where a person counts digits
+        digits = max(digits, _order(size) + 1)
+    return f"{number(value, digits + 1)} ({number(low, digits)} to {number(high, digits)})"
+
+
+def _order(size: float) -> int:
+    """Return the power of ten of the first digit of a positive number."""
+    return math.floor(math.log10(size))
 
 
 def millimetres(*lengths: float) -> str:

@@ -65,7 +65,7 @@ def test_a_relaxation_gives_terms_for_a_study(palpate, tmp_path):
         ("tension.csv", "a,b", (), "no column of stretch or strain"),
         ("tension.csv", "stretch,nominal stress [kPa]", ("--column", "x=a"), "no column of a test"),
         ("tension.csv", "stretch,nominal stress [kPa]", ("--test", "pulling"), "given as pulling"),
-        ("indent.csv", "depth [mm],force [mN]", (), "Radius of the ball"),
+        ("indent.csv", "depth [mm],force [mN]", (), "radius of the ball"),
     ],
 )
 def test_what_is_not_known_is_asked_for(palpate, tmp_path, name, head, words, told):
@@ -85,3 +85,22 @@ def test_the_page_on_materials_from_tests_runs(monkeypatch):
     assert len(blocks) == 2
     for block in blocks:
         exec(compile(block, "material-from-tests.md", "exec"), names)
+
+
+def test_all_that_is_missing_is_asked_for_at_once(palpate, tmp_path):
+    rows = "\n1.0,0\n1.1,1\n1.2,2\n1.3,3\n"
+    (tmp_path / "a-tensile.csv").write_text("foo,bar" + rows)
+    (tmp_path / "indent.csv").write_text("depth [mm],force [mN]" + rows)
+    files = [tmp_path / name for name in ("a-tensile.csv", "indent.csv", "gone-tensile.csv", "unnamed.csv")]
+    (tmp_path / "unnamed.csv").write_text("stretch,stress [Pa]" + rows)
+    answer = palpate("material", "fit", *files)
+    assert answer.code == 2
+    assert answer.err.startswith("error: 5 things are wrong:")
+    for told in (
+        "no column of stretch",
+        "no column of nominal",
+        "radius of the ball",
+        "no such file",
+        "kind of the",
+    ):
+        assert answer.err.count(told) == 1, told

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
+from palpate.cli.fit_command import few_rows
 from palpate.surrogates import Surrogate
 
 sys.path.append(str(Path(__file__).parents[1] / "learning" / "correction"))
@@ -44,6 +45,14 @@ def learnt(bench):
         main(["fit", str(bench), *words])
     assert not stop.value.code
     return bench.with_suffix(".palpate")
+
+
+def test_few_rows_are_said_to_be_few():
+    (line,) = few_rows(30, 3)
+    assert "10 for each input" in line
+    assert "±26 %" in line, "two deviations of a root mean square of 30 errors: 2 / √60"
+    assert few_rows(101, 3) == []
+    assert few_rows(101, 20) != []
 
 
 @pytest.mark.full

@@ -41,7 +41,7 @@ def test_the_same_command_goes_on(palpate, asked, tmp_path):
     assert asked[0].interaction == asked[1].interaction
     other = palpate(*words, "--radius", "7 mm", "--until", "5%")
     assert other.code == 2
-    assert "It says otherwise of --radius." in other.err
+    assert "says otherwise of --radius." in other.err
     assert len(asked) == 2
 
 
@@ -61,8 +61,54 @@ def test_one_part_has_several_studies_by_their_names(palpate, asked, tmp_path):
     assert [path.name for path in tmp_path.glob("*.toml")] == ["soft.toml"]
     other = palpate("touch", part, "--name", "soft", "--material", "kidney", "--no-view")
     assert other.code == 2
-    assert "It says otherwise of --material." in other.err
+    assert "says otherwise of --material" in other.err
     assert "--name NAME" in other.err
+
+
+@pytest.mark.parametrize(
+    ("options", "keys"),
+    [
+        (("--unit", "cm"), "unit"),
+        (("--young", "4 kPa"), "young"),
+        (("--poisson", "0.4"), "poisson"),
+        (("--radius", "7 mm"), "radius"),
+        (("--depth", "1 mm"), "depth"),
+        (("--held", "face 5"), "fixed"),
+        (("--touched", "face 2"), "touches"),
+    ],
+)
+def test_an_option_that_the_study_says_otherwise_is_named_with_its_line(
+    palpate, asked, tmp_path, options, keys
+):
+    part = box(tmp_path / "pad.stl")
+    assert palpate("init", part).code == 0
+    lines = (tmp_path / "pad.toml").read_text(encoding="utf-8").splitlines()
+    answer = palpate("touch", part, *options, "--no-view")
+    assert answer.code == 2
+    asked_for, where = next(line for line in answer.err.splitlines() if line.startswith("  ")).split("; ")
+    assert asked_for == f"  {options[0]} asks for {options[1]}"
+    number, line = where.removeprefix("line ").split(" says ")
+    assert lines[int(number) - 1].startswith(line)
+    assert line.startswith(f"{keys} = ")
+    assert not asked
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--depth", "1 m"),
+        ("--radius", "0.01 mm"),
+        pytest.param(("--depth", "25 mm", "--radius", "8 mm"), marks=pytest.mark.full),
+        ("--device", "stroke"),
+        ("--device", "omni"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::UserWarning")  # of a pad that is too soft for such a ball
+def test_options_that_are_refused_leave_no_study_behind(palpate, tmp_path, options):
+    part = box(tmp_path / "pad.stl")
+    answer = palpate("touch", part, *options, "--no-view", "--minutes", "0")
+    assert answer.code == 2, answer.err
+    assert list(tmp_path.iterdir()) == [part]
 
 
 @pytest.mark.full

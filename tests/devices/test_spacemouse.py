@@ -234,7 +234,7 @@ def send_pieces_and_a_flood(hand, daemon):
 def test_a_missing_daemon_says_what_to_install_and_where_it_was_looked_for(tmp_path, monkeypatch, connect):
     monkeypatch.setenv("SPNAV_SOCKET", str(tmp_path / "named.sock"))
     monkeypatch.setattr(spacemouse, "SOCKET", str(tmp_path / "default.sock"))
-    with pytest.raises(DeviceError, match="spacenavd, does not answer") as caught:
+    with pytest.raises(DeviceError, match="spacenavd, is not running") as caught:
         SpaceMouseDevice()
     text = str(caught.value)
     for words in ("named.sock", "default.sock", "SPNAV_SOCKET", "/etc/spnavrc", "apt install spacenavd"):

@@ -12,6 +12,7 @@ from palpate.learning import Refinement, hand_coordinates, learn_dataset
 from palpate.physics import Circle, Rectangle, Section
 from palpate.study import Study, preset_names, preset_study, read_study, to_toml
 from palpate.study.run import split_rows
+from palpate.study.toml import key_line
 from palpate.sweeps import sweep
 
 
@@ -24,6 +25,20 @@ def test_quantities_may_carry_units():
     assert s.body.length == pytest.approx(0.25)
     assert s.body.section.radius == pytest.approx(0.005)
     assert s.body.material.young == pytest.approx(1.1e11)
+
+
+@pytest.mark.parametrize(
+    ("text", "number", "line"),
+    [
+        ('[body]\nkind = "part"\n[body.material]\nyoung = "9 kPa" # soft\n', 4, 'young = "9 kPa"'),
+        ('[body]\nmaterial = { young = "9 kPa" }\n', 2, 'material = { young = "9 kPa" }'),
+        ("[body]\nmaterial.young = 9e3\n", 2, "material.young = 9e3"),
+        ("[body.material]\npoisson = 0.4\n[[body.surfaces]]\nyoung = 1\n", 1, "[body.material]"),
+        ("young = 1\n[interaction]\nyoung = 1\n", 0, ""),
+    ],
+)
+def test_the_line_that_says_a_key_is_named(text, number, line):
+    assert key_line(text, "body", "material", "young") == (number, line)
 
 
 def test_a_study_is_frozen():

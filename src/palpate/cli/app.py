@@ -275,7 +275,7 @@ def ask(
     reading: Any = None,
     as_json: Json = False,
 ) -> None:
-    """Print what a model file holds, or its answers at given places or at all rows of a table."""
+    """Ask a model for its answers at places or at all rows of a table; without them, say which inputs it takes."""
     if table is None:
         if out is not None or reading:
             raise UsageError("These options are for a table.", fix="Give the table with --table.")

@@ -45,7 +45,13 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(contents)}
         warning = _warning(contents)
         noun = _NOUNS.get(what, what)
-        console.result("\n".join([f"{noun} in {model}\n{contents}", *warning]), content | _as_field(warning))
+        names = ",".join(r.name for r in inputs)
+        ways = [
+            f"ask it   palpate ask {model} --at {names}",
+            f"record   palpate card {model}   (where it comes from, how good it is)",
+        ] * bool(names)
+        text = "\n".join([f"{noun} in {model}\n{contents}", *warning, *ways])
+        console.result(text, content | _as_field(warning))
         return
     line = _line_under_loads(contents)
     if line is not None:

@@ -52,7 +52,7 @@ def card(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Print the card of a model: what it was trained on, by whom, its errors, limits, hashes and licence."""
+    """Print the record of a model for other people: origin, author, errors, limits, hashes and licence, as a page."""
     from palpate.files import write_file
     from palpate.learning.loading import load
     from palpate.output_files import with_seal

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from palpate import checks
 from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.number_options import number_option
@@ -114,13 +116,10 @@ def fit(
 ) -> None:
     """Fit a material's constants to tests on specimens, and print them with intervals and what is not told."""
     from palpate.cli.specimen_tables import SpecimenTables
-    from palpate.units import parse_quantity
 
-    heights = [parse_quantity(text, "m", "--height") for text in height or []]
-    areas = [parse_quantity(text, "m²", "--area") for text in area or []]
-    for option, values in (("--height", heights), ("--area", areas)):
-        if not all(value > 0 for value in values):
-            raise UsageError(f"{option} is not positive.", fix="Give the size of the undeformed specimen.")
+    heights, areas = checks.gather(
+        [partial(_specimen_sizes, "--height", "m", height), partial(_specimen_sizes, "--area", "m²", area)]
+    )
     tables = SpecimenTables(files, test or [], measure, column or [], reading, heights, areas, cycle)
     sizes = {"radius": radius, "thickness": thickness, "width": width}
     options = {"law": law, "poisson": poisson, "weight": weight, "margin": margin}
@@ -147,19 +146,20 @@ def fit_material(
     """
     from palpate.files import write_file
 
-    if missing := [str(file) for file in tables.files if not file.is_file()]:
-        raise UsageError(
-            f"{', '.join(missing)}: no such file.",
-            fix="Give the path of a table, as text (CSV and its kin) or .xlsx.",
-        )
-    kinds = [tables.kind(i) for i in range(len(tables.files))]
+    lengths = _lengths(sizes)
+    calls = [partial(_read_test, tables, i, lengths) for i in range(len(tables.files))]
+    kinds, tests = map(list, zip(*checks.gather(calls), strict=True))
     if "relaxation" in kinds:
-        found = _fit_relaxation(tables, options)
-    elif "indentation" in kinds:
-        console.say("Solving the slab by finite elements …")
-        found = _fit_indentation(tables, kinds, options, sizes)
+        found = _fit_relaxation(tests, options)
     else:
-        found = _fit_stresses(tables, kinds, options)
+        from palpate.physics.materials import fit as fit_law
+
+        is_pressed = "indentation" in kinds
+        if is_pressed:
+            console.say("Solving the slab by finite elements …")
+        usual, more = (0.45, {}) if is_pressed else (0.5, {k: options[k] for k in ("weight", "margin")})
+        poisson = usual if options["poisson"] is None else options["poisson"]
+        found = fit_law(options["law"], tests, poisson=poisson, **more)
     found = replace(found, notes=(*tables.notes, *found.notes))
     if plot is not None:
         found.plot(plot)
@@ -169,17 +169,55 @@ def fit_material(
     console.result(f"{found}\n\n{found.toml()}".rstrip(), content)
 
 
-def _fit_relaxation(tables: SpecimenTables, options: dict[str, Any]) -> Any:
+def _specimen_sizes(option: str, unit: str, texts: list[str] | None) -> list[float]:
+    """Return the sizes of undeformed specimens that an option gives, in an SI unit."""
+    from palpate.units import parse_quantity
+
+    sizes = [parse_quantity(text, unit, option) for text in texts or []]
+    if not all(size > 0 for size in sizes):
+        raise UsageError(f"{option} is not positive.", fix="Give the size of the undeformed specimen.")
+    return sizes
+
+
+def _lengths(sizes: dict[str, str | None]) -> dict[str, float]:
+    """Return the sizes of an indentation that are given, m."""
+    from palpate.units import parse_quantity
+
+    return {name: parse_quantity(text, "m", f"--{name}") for name, text in sizes.items() if text is not None}
+
+
+def _read_test(tables: SpecimenTables, i: int, lengths: dict[str, float]) -> tuple[str, Any]:
+    """Return the kind of the test in a file, and its record; of a relaxation times, responses and their unit."""
+    file = tables.files[i]
+    if not file.is_file():
+        raise UsageError(
+            f"{file}: no such file.", fix="Give the path of a table, as text (CSV and its kin) or .xlsx."
+        )
+    kind = tables.kind(i)
+    if kind == "relaxation":
+        return kind, tables.relaxation(i)
+    if kind != "indentation":
+        return kind, tables.stretch_test(i, kind)
+    if not {"radius", "thickness"} <= lengths.keys():
+        raise UsageError(
+            f"{file}: the radius of the ball and the thickness of the slab are not known.",
+            why="The force depends on both.",
+            fix='Give them: --radius "5 mm" --thickness "20 mm".',
+        )
+    return kind, tables.indentation(i, lengths)
+
+
+def _fit_relaxation(tests: list[Any], options: dict[str, Any]) -> Any:
     from palpate.physics.materials import fit_relaxation
     from palpate.units import parse_quantity
 
-    if len(tables.files) > 1:
+    if len(tests) > 1:
         raise UsageError(
             "A relaxation is fitted alone.",
             why="It tells shares and times, other tests tell moduli.",
             fix="Fit the other files by a command of their own.",
         )
-    time, response, unit = tables.relaxation(0)
+    time, response, unit = tests[0]
     units = {"begin": "s", "ramp": "s", "preload": unit}
     given: dict[str, Any] = {
         name: parse_quantity(options[name], own, f"--{name}")
@@ -187,40 +225,3 @@ def _fit_relaxation(tables: SpecimenTables, options: dict[str, Any]) -> Any:
         if options[name] is not None
     }
     return fit_relaxation(time, response, **given)
-
-
-def _fit_indentation(
-    tables: SpecimenTables, kinds: list[str], options: dict[str, Any], sizes: dict[str, str | None]
-) -> Any:
-    from palpate.physics.materials import fit
-    from palpate.units import parse_quantity
-
-    lengths = {
-        name: parse_quantity(text, "m", f"--{name}") for name, text in sizes.items() if text is not None
-    }
-    if not {"radius", "thickness"} <= lengths.keys():
-        raise UsageError(
-            "Radius of the ball and thickness of the slab are not known.",
-            why="The force depends on both.",
-            fix='Give them: --radius "5 mm" --thickness "20 mm".',
-        )
-    tests: list[Any] = []
-    for i, kind in enumerate(kinds):
-        if kind == "indentation":
-            tests.append(tables.indentation(i, lengths))
-        else:
-            tests.append(tables.stretch_test(i, kind))
-    poisson = 0.45 if options["poisson"] is None else options["poisson"]
-    return fit(options["law"], tests, poisson=poisson)
-
-
-def _fit_stresses(tables: SpecimenTables, kinds: list[str], options: dict[str, Any]) -> Any:
-    from palpate.physics.materials import fit
-
-    return fit(
-        options["law"],
-        [tables.stretch_test(i, kind) for i, kind in enumerate(kinds)],
-        poisson=0.5 if options["poisson"] is None else options["poisson"],
-        weight=options["weight"],
-        margin=options["margin"],
-    )

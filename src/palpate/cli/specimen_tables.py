@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate import checks
 from palpate.errors import FileFormatError, UsageError
 from palpate.format import by_number
 from palpate.tables import Column, Table, named_quantity, read_table
@@ -92,10 +94,11 @@ class SpecimenTables:
         from palpate.physics.materials import StretchTest
 
         table = self._read(i)
-        what, column = self._deformation(table)
+        (what, column), (held, other) = checks.gather(
+            [partial(self._deformation, table), partial(self._stress, table)]
+        )
         amount = table.values(column.name, _UNITS[what])
         self._check_percent(table, column, what, amount)
-        held, other = self._stress(table)
         stress = table.values(other.name, _UNITS[held])
         if what == "extension":
             amount = amount / _of_file(self.heights, i, len(self.files), "--height")

@@ -111,7 +111,15 @@ def learn_path(study: Path, effort: float | None, console: Console, *, watch: bo
     """
     if not study.is_dir():
         if effort is not None:
-            raise UsageError("A study file states its own effort.", fix="Leave out --effort.")
+            from palpate.study.toml import key_line
+
+            with open_input(study) as file:
+                number, line = key_line(file.read().decode(errors="replace"), "learning", "effort")
+            raise UsageError(
+                f"A study file states its own effort, and --effort asks for {effort:g}.",
+                why=f"Line {number} of {study} says {line}" if number else f"{study} has the default, 1.",
+                fix="Change it there, in [learning], and leave out --effort.",
+            )
         learn_file(study, console, watch=watch)
         return
     if watch:

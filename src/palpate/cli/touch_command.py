@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import math
+import contextlib
+import shutil
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from palpate.cli.changed_options import chosen_words, require_same
 from palpate.cli.number_options import count_option, declared_option, number_option, with_options
 from palpate.cli.table_options import Json, Verbose
 from palpate.errors import UsageError
@@ -52,32 +55,69 @@ def touch(
 ) -> None:
     """Open a part on a page, to be touched while solves and learning improve it. Called again, it goes on."""
     from palpate.cli.console import Console
+    from palpate.devices import device_traits
     from palpate.study.run import Paths
 
     console = Console(as_json, verbose)
     limit = 60 * minutes
+    device_traits(device)  # a name that is none is refused before anything is read
     if sys.stdout.isatty() and not as_json if view is None else view:
         from palpate.cli.touch_page import TouchedPart, touch_on_page
 
         if not part.is_file():
             raise UsageError(f"There is no file {part}.", fix=f"Name {PART_FORMATS}.")
         notes: list[str] = []
-        touch_on_page(
-            part.stem,
-            lambda other: _study_on_page(
-                part, replace(choices, unit=other) if other else choices, notes, console
-            ),
-            lambda study: _write(part, study, notes),
-            TouchedPart(until, limit, workers, console),
-            at_once=start,
-            port=port,
-            device=device,
-            recordings=part.parent,
-        )
+        touched = TouchedPart(until, limit, workers, console)
+        with _no_study_of_refusals(part, choices.name):
+            touch_on_page(
+                part.stem,
+                lambda other: _study_on_page(
+                    part, replace(choices, unit=other) if other else choices, notes, console
+                ),
+                lambda study: _write(part, study, notes),
+                touched,
+                at_once=start,
+                port=port,
+                device=device,
+                recordings=part.parent,
+            )
+            if touched.exit_code == UsageError.exit_code:
+                raise UsageError(
+                    "The study was refused.", fix="Give the command again, and choose otherwise."
+                )
         return
-    study = _study_of(part, choices, console)
+    if device != "page":
+        raise UsageError(
+            f"--device {device} presses on the page, and there is none.",
+            why="There is no terminal, or --no-view or --json is given.",
+            fix="Add --view, or leave --device out.",
+        )
     options = ImprovementOptions(until=until, limit=limit, workers=workers)
-    _carry_on(study.with_workers(workers), Paths(part.parent, study.name), options, console)
+    with _no_study_of_refusals(part, choices.name):
+        study = _study_of(part, choices, console)
+        _carry_on(study.with_workers(workers), Paths(part.parent, study.name), options, console)
+
+
+@contextlib.contextmanager
+def _no_study_of_refusals(part: Path, name: str | None) -> Iterator[None]:
+    """Remove a study that was not there before, where what it says is refused before anything is solved.
+
+    Else the next command would go on with it, and refuse other options.
+    """
+    from palpate.study.part_study import study_file
+    from palpate.study.run import Paths
+
+    file = study_file(part, name)
+    was_there = file.exists()
+    try:
+        yield
+    except UsageError:
+        data = Paths(file.parent, file.stem).data
+        plan = data.with_name(f"{data.name}.batch")
+        if not was_there and not data.exists() and not data.with_name(f"{data.name}.parts").exists():
+            file.unlink(missing_ok=True)
+            shutil.rmtree(plan, ignore_errors=True)  # places that were chosen, and not solved
+        raise
 
 
 def _study_on_page(
@@ -96,7 +136,7 @@ def _study_on_page(
         study, held = part_study(part, options=choices)
     notes[:] = held
     console.say("\n".join(filter(None, notes)))
-    console.say(f"{_chosen(study)} Change it on the page, and press start there.")
+    console.say(f"{chosen_words(study)} Change it on the page, and press start there.")
     return study, file, False
 
 
@@ -120,16 +160,7 @@ def _study_of(part: Path, choices: PartOptions, console: Console) -> Study:
     if file.exists():
         with console.patience(f"Reading {file} and {part}"):
             study = read_study(file)
-        said = _choices_of(study)
-        given = {
-            name: value for name, value in vars(choices).items() if value not in (None, ()) and name != "name"
-        }
-        if others := [name for name, value in given.items() if not _are_equal(said.get(name), value)]:
-            raise UsageError(
-                f"{file} exists already, and says what is held, touched and of what material.",
-                why=f"It says otherwise of {', '.join('--' + name for name in others)}.",
-                fix="Change the file and leave the options out, or give a new study another name: --name NAME.",
-            )
+        require_same(file, study, choices)
         _require_part(study, file, part)
         console.say(f"Going on with the study {file} …")
         return study
@@ -137,7 +168,7 @@ def _study_of(part: Path, choices: PartOptions, console: Console) -> Study:
         study, notes = part_study(part, options=choices)
     write_file(file, part_text(study, notes))
     console.say("\n".join(filter(None, notes)))
-    console.say(f"{_chosen(study)} {file} says all of it; change it there.")
+    console.say(f"{chosen_words(study)} {file} says all of it; change it there.")
     return study
 
 
@@ -150,43 +181,6 @@ def _require_part(study: Study, file: Path, part: Path) -> None:
             why=f"It is one of {'another body' if other is None else Path(other).name}.",
             fix="Give the study of this part another name: --name NAME.",
         )
-
-
-def _choices_of(study: Study) -> dict[str, Any]:
-    """Return what the study of a part says of the options of this command."""
-    from palpate.study.interaction_records import ProbeRecord
-    from palpate.study.material_records import SolidMaterialRecord
-    from palpate.study.part_records import PartRecord
-
-    body, acting = study.body, study.interaction
-    if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord):
-        return {}
-    said: dict[str, Any] = {"radius": acting.radius, "depth": acting.depth[1], "touched": acting.touches}
-    said |= {"unit": body.unit, "held": body.fixed_names()}
-    if isinstance(body.material, str):
-        said["material"] = body.material
-    elif isinstance(body.material, SolidMaterialRecord):
-        said |= {"young": body.material.young, "poisson": body.material.poisson}
-    return said
-
-
-def _are_equal(one: Any, other: Any) -> bool:
-    """Return whether two choices are the same; numbers may differ by the rounding of a unit."""
-    if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=1e-9)
-    return bool(one == other)
-
-
-def _chosen(study: Study) -> str:
-    """Return what was chosen for a part, in one sentence."""
-    from palpate.study.interaction_records import ProbeRecord
-
-    acting, held = study.interaction, ", ".join(study.body.fixed_names())
-    assert isinstance(acting, ProbeRecord)
-    held = "what it stands on" if held == "held" else held
-    surface = "the surface that faces up" if acting.touches == "touched" else acting.touches
-    ball = f"a ball of {1e3 * acting.radius:g} mm"
-    return f"Held at {held}; {ball} presses {surface}, up to {1e3 * acting.depth[1]:g} mm deep."
 
 
 def _carry_on(study: Study, paths: Paths, options: ImprovementOptions, console: Console) -> None:

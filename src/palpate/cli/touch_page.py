@@ -86,6 +86,7 @@ class TouchedPart:
     def __init__(self, until: float, limit: float, workers: int | None, console: Console) -> None:
         self.until, self.limit, self.workers, self.console = until, limit, workers, console
         self.times: dict[str, float] = {}
+        self.exit_code = 0  # of the work, once it has ended: 2 where it refused the study
         self._made = time.monotonic()
         self._progress = Progress("starting", target=until)
         self._estimate = WorkEstimate()
@@ -128,7 +129,7 @@ class TouchedPart:
         self._stopped = True
         self._bodies.put(None)
         self._warm_up.close()
-        self._work.close()
+        self.exit_code = self._work.close()
         for thread in self._threads:
             thread.join(1.0)
 

@@ -267,7 +267,7 @@ def _connected(path: str) -> socket.socket:
         configuration = Path(CONFIGURATION).read_text(encoding="utf-8", errors="replace")
     except OSError:
         configuration = ""
-    refusals = []
+    refusals, absent = [], True
     for place in (path,) if path else sockets(os.environ, configuration):
         try:
             connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -281,13 +281,14 @@ def _connected(path: str) -> socket.socket:
             connection.connect(place)
         except OSError as error:
             connection.close()
-            refusals.append(f"{place}: {error}")
+            absent = absent and isinstance(error, FileNotFoundError)
+            refusals.append(place if isinstance(error, FileNotFoundError) else f"{place}: {error.strerror}")
         else:
             connection.setblocking(False)
             return connection
     looked = "" if path else f" (named by ${VARIABLE}, by `socket =` in {CONFIGURATION}, or by default)"
     raise DeviceError(
-        "The driver of 3Dconnexion pucks, spacenavd, does not answer.",
-        why=f"Tried the socket {'; '.join(refusals)}{looked}.",
+        f"The driver of 3Dconnexion pucks, spacenavd, {'is not running' if absent else 'does not answer'}.",
+        why=f"{'There is no' if absent else 'Tried the'} socket {'; '.join(refusals)}{looked}.",
         fix=INSTALL,
     )

@@ -46,6 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _run(options)
     except PalpateError as error:
         sys.stderr.write(f"{error}\n")
+        _say({"error": [error.what, error.why, error.fix]})
         return error.exit_code
 
 

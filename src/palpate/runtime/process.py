@@ -412,6 +412,11 @@ class LoopProcess:
     def _failure(self, what: str) -> DeviceError | UsageError:
         code = self._running.poll()
         why = self._complaint()
+        if self._listener is not None and code is not None:
+            self._listener.join(1.0)  # until the last words have come
+        if (own := self._said.get("error")) is not None:  # the cause comes first, not that the process ended
+            kind = UsageError if code == UsageError.exit_code else DeviceError
+            return kind(own[0], why=own[1], fix=own[2])
         if code == UsageError.exit_code:
             return UsageError(why or what)
         return DeviceError(

@@ -21,7 +21,7 @@ from palpate.record_complaints import complaints, unit_in
 from palpate.study.study import Study
 from palpate.units import parse_quantity
 
-__all__ = ["read_study", "study_schema", "to_toml"]
+__all__ = ["key_line", "read_study", "study_schema", "to_toml"]
 
 _EXAMPLES = {"cantilever": "beam-nylon", "layered": "layered", "dome": "breast-dome", "organ": "liver"}
 """Presets that show every key of a kind of body; the block shows those of the others."""
@@ -126,6 +126,27 @@ def _example_of(content: dict[str, Any]) -> str:
         return "--preset grasp"
     kind = body.get("kind", "cantilever") if isinstance(body, dict) else "cantilever"
     return f"--preset {_EXAMPLES.get(str(kind), 'block')}"
+
+
+def key_line(text: str, *keys: str) -> tuple[int, str]:
+    """Return number and text of the line of a study file that says a key, such as ("body", "material", "young").
+
+    It is the line of the key itself, of the inline table that holds it, or of the table where the key has its default;
+    0 and "" where the file says none of these.
+    """
+    table, nearest, held = tuple[str, ...](), (0, ""), 0
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := re.match(r"\s*\[([\w. -]+)\]", line):
+            table = path = tuple(part.strip() for part in header[1].split("."))
+        elif re.match(r"\s*\[\[", line):
+            table = path = ("",)  # one of several tables: none of their keys is asked for
+        elif key := re.match(r"\s*([\w.-]+)\s*=", line):
+            path = (*table, *key[1].split("."))
+        else:
+            continue
+        if path == keys[: len(path)] and len(path) > held:
+            nearest, held = (number, line.partition(" #")[0].strip()), len(path)
+    return nearest
 
 
 def study_schema() -> str:

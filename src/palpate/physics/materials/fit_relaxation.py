@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from palpate import checks
 from palpate.errors import UsageError
-from palpate.format import number
+from palpate.format import number, with_interval
 from palpate.output_files import picture_metadata
 from palpate.physics.materials.prony import PronySeries
 from palpate.physics.materials.relaxation_record import held_record
@@ -86,8 +86,8 @@ class RelaxationFit:
         lines = [
             f"relaxes in {len(self.shares)} terms ({self.confidence:.0%} intervals); error {self.error:.2%} rms"
         ]
-        for (g, g0, g1), (t, t0, t1) in zip(self.shares, self.times, strict=True):
-            lines.append(f"  share {g:.4g} ({g0:.3g} to {g1:.3g}) in {t:.4g} s ({t0:.3g} to {t1:.3g} s)")
+        for share, time in zip(self.shares, self.times, strict=True):
+            lines.append(f"  share {with_interval(*share)} in {with_interval(*time)} s")
         lines.append(f"  at once {number(self.instantaneous)}, in the end {number(self.equilibrium)}")
         return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.format import number
+from palpate.format import number, with_interval
 from palpate.output_files import picture_metadata
 from palpate.physics.materials.law_forms import stress_in_test
 from palpate.physics.materials.material_stability import Stability
@@ -36,7 +36,7 @@ class Constant:
 
     def __str__(self) -> str:
         """Return name, value, interval and unit."""
-        return f"{self.name} = {self.value:.5g} ({self.low:.4g} to {self.high:.4g}) {self.unit}".rstrip()
+        return f"{self.name} = {with_interval(self.value, self.low, self.high)} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,104 @@
+"""Options that a study beside a part says otherwise: each with the line of the file, its value, and what is asked."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.errors import UsageError
+from palpate.format import millimetres, pressure
+from palpate.options import PartOptions, declarations
+
+if TYPE_CHECKING:
+    from palpate.study import Study
+
+__all__ = ["chosen_words", "require_same"]
+
+_KEYS = {
+    "unit": ("body", "unit"),
+    "material": ("body", "material"),
+    "young": ("body", "material", "young"),
+    "poisson": ("body", "material", "poisson"),
+    "radius": ("interaction", "radius"),
+    "depth": ("interaction", "depth"),
+    "held": ("body", "fixed"),
+    "touched": ("interaction", "touches"),
+}
+"""Key of a study file that says each option of a part."""
+
+
+def require_same(file: Path, study: Study, choices: PartOptions) -> None:
+    """Refuse options that a study file says otherwise, and name the lines that do."""
+    from palpate.study.toml import key_line
+
+    stated = _choices_of(study)
+    differing = [
+        name
+        for name, keys in _KEYS.items()
+        if (wanted := getattr(choices, name, None)) not in (None, ())
+        and not _are_equal(stated.get(name), wanted)
+    ]
+    if not differing:
+        return
+    text = file.read_text(encoding="utf-8")
+    lines = []
+    for name in differing:
+        number, line = key_line(text, *_KEYS[name])
+        where = f"line {number} says {line}" if number else "it says nothing of it"
+        lines.append(f"  {_flag(name)} asks for {_words(name, getattr(choices, name))}; {where}")
+    raise UsageError(
+        f"{file} exists already, and says otherwise of {', '.join(map(_flag, differing))}.",
+        why="\n".join(lines),
+        fix="Change these lines and leave the options out, or give a new study another name: --name NAME.",
+    )
+
+
+def chosen_words(study: Study) -> str:
+    """Return what was chosen for a part, in one sentence."""
+    from palpate.study.interaction_records import ProbeRecord
+
+    acting, held = study.interaction, ", ".join(study.body.fixed_names())
+    assert isinstance(acting, ProbeRecord)
+    held = "what it stands on" if held == "held" else held
+    surface = "the surface that faces up" if acting.touches == "touched" else acting.touches
+    ball = f"a ball of {1e3 * acting.radius:g} mm"
+    return f"Held at {held}; {ball} presses {surface}, up to {1e3 * acting.depth[1]:g} mm deep."
+
+
+def _flag(name: str) -> str:
+    """Return an option as it is typed."""
+    return (declarations(PartOptions)[name].flag or f"--{name}").split()[0]
+
+
+def _words(name: str, value: Any) -> str:
+    """Return the value of an option in words, with its unit."""
+    unit = declarations(PartOptions)[name].unit
+    if unit in {"m", "Pa"}:
+        return millimetres(value) if unit == "m" else pressure(value)
+    return ", ".join(value) if isinstance(value, tuple) else str(value)
+
+
+def _choices_of(study: Study) -> dict[str, Any]:
+    """Return what the study of a part says of the options."""
+    from palpate.study.interaction_records import ProbeRecord
+    from palpate.study.material_records import SolidMaterialRecord
+    from palpate.study.part_records import PartRecord
+
+    body, acting = study.body, study.interaction
+    if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord):
+        return {}
+    said: dict[str, Any] = {"radius": acting.radius, "depth": acting.depth[1], "touched": acting.touches}
+    said |= {"unit": body.unit, "held": body.fixed_names()}
+    if isinstance(body.material, str):
+        said["material"] = body.material
+    elif isinstance(body.material, SolidMaterialRecord):
+        said |= {"young": body.material.young, "poisson": body.material.poisson}
+    return said
+
+
+def _are_equal(one: Any, other: Any) -> bool:
+    """Return whether two choices are the same; numbers may differ by the rounding of a unit."""
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=1e-9)
+    return bool(one == other)

@@ -98,6 +98,10 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
             "interaction.radius: '1 kg' is not a quantity in m",
         ),
         ('[body]\nkind = "block"\n[interaction]\ndepth = [0.01, 0.002]', "is no range"),
+        (
+            '[body]\nkind = "block"\n[interaction]\ndepth = ["0.2 mm", "-2 mm"]',
+            'for example depth = ["0.2 mm", "8 mm"]',
+        ),
         ('[body]\nkind = "block"\n[sweep]\nsamples = 8\ndepths = 9', "no depth series"),
         ('[body]\nkind = "block"\n[learning]\nsecond = 3', "learning.second: there is no such key"),
         ('[body]\nkind = "layered"', "body.layers"),

@@ -15,6 +15,7 @@ from palpate.study.part_study import part_study
 CELLS = 60  # along each side of the box around an organ
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize("name", ORGANS)
 def test_an_organ_bounds_its_implicit_body(name: str, tmp_path: Path):
     """Its volume is that of the cells of a grid in which the function is negative; each ray leaves the body once."""

@@ -14,6 +14,7 @@ from bodies import arc_beam
 from playwright.sync_api import Browser, Page
 from slabs import family, touched_slab
 
+import pressed
 from held import pad
 from linear_bodies import history, tip_data, tip_model
 from palpate.learning import PRESETS, learn
@@ -89,7 +90,11 @@ def report(folder: Path) -> Iterator[str]:
     model, data = tip_model(shift=1e-6, slope=1e-7, force=0.999), tip_data()
     validation = validate(model, data, history=history())
     chapter = Chapter("beam", model, data.every(3), validation, train=data, history=history())
-    yield write_report(folder / "report.html", [chapter]).as_uri()
+    slab, few = touched_slab(), pressed.solves(pressed.places(8))
+    pressed_chapter = Chapter(
+        "a slab", slab, few, validate(slab, few), train=pressed.dataset(pressed.solves())
+    )
+    yield write_report(folder / "report.html", [chapter, pressed_chapter]).as_uri()
 
 
 @contextmanager

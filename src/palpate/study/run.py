@@ -75,6 +75,9 @@ class Outcome:
 
     def chapter(self) -> Chapter:
         """Return the outcome as a chapter of a report."""
+        from palpate.study.study_advice import advice_after
+
+        file = Path(f"{self.study.name}.toml")
         return Chapter(
             name=self.study.name,
             model=self.model,
@@ -86,6 +89,7 @@ class Outcome:
             settings=self.study.model_dump(mode="json", exclude_none=True),
             timings=self.timings,
             comparisons=self.comparisons,
+            advice=advice_after(self.study, self.model, self.train, self.validation, file),
         )
 
 

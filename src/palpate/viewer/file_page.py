@@ -32,7 +32,8 @@ from palpate.format import script_json
 from palpate.output_files import require_outputs, with_seal
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import FieldSurrogate, Surrogate
-from palpate.surrogates.model_card import card_of
+from palpate.surrogates.model_card import ModelCard, card_of
+from palpate.viewer.about_record import about_record
 from palpate.viewer.messages import Hello
 from palpate.viewer.packed_surface import PackedSurface, rounded_points
 from palpate.viewer.page_model import PageModel
@@ -149,7 +150,7 @@ class _Page:
         hello = replace(
             hello,
             fields=tuple(info for info in hello.fields if info.name in kept),
-            meta={**card.in_words(), **missing},
+            meta=about_record(surrogate.meta) | about_record(_card_in_words(card)) | missing,
         )
         for i, field in enumerate(fields):
             parts[f"field-{i}"] = field.modes
@@ -296,6 +297,12 @@ def _document(name: str, parts: Mapping[str, str], card: str) -> str:
 </body>
 </html>
 """
+
+
+def _card_in_words(card: ModelCard) -> dict[str, Any]:
+    """Return what a model card says beside the record of the body's making."""
+    words = card.in_words()
+    return {name: words[name] for name in words if name not in {"trained on", "errors"}}
 
 
 def _by_weight(data: bytes) -> bytes:

@@ -13,12 +13,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from palpate.devices.hand_kind import HandKind
-from palpate.format import summary_figure
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import NodeField
 from palpate.units import Range, bounds
+from palpate.viewer.about_record import about_record
 from palpate.viewer.indentation_drawing import yielding_in_words
 from palpate.viewer.messages import PROTOCOL, Frame, Hello, Line, Modes, RangeInfo, Surface, Vec3
 from palpate.viewer.part_messages import TrustMap
@@ -120,7 +120,7 @@ class PageModel:
             faults=tuple(fault.meaning_for(hand) for fault in Fault),
             hand=hand,
             device=device,
-            meta=_in_words(body.meta),
+            meta=about_record(body.meta),
         )
 
     def frame(self, loop: Mapping[str, Any], state: State, held: bool, parameters: np.ndarray) -> Frame:
@@ -207,15 +207,6 @@ def swing(elapsed: float) -> float:
 def vector(v: np.ndarray) -> Vec3:
     """Return three numbers as a tuple."""
     return (float(v[0]), float(v[1]), float(v[2]))
-
-
-def _in_words(meta: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a body's record with its figures of merit as the terminal writes them."""
-    words = dict(meta)
-    for part in ("validation", "left_out"):
-        if isinstance(figures := meta.get(part), Mapping):
-            words[part] = {name: summary_figure(name, value) for name, value in figures.items()}
-    return words
 
 
 def _ranges(inputs: tuple[Range, ...]) -> tuple[RangeInfo, ...]:

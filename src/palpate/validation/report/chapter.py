@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from palpate.learning import History
 from palpate.learning.learn_dataset import filter_record
 from palpate.validation.figures.history_following import Followed, follow_unseen
@@ -45,6 +47,8 @@ class Chapter:
         By default the training set's own, else that of the model.
     comparisons : sequence of TouchComparison
         Recorded touches beside the full model.
+    advice : str
+        How many solves would keep the limits, as a sentence; empty where more solves help nothing.
     """
 
     name: str
@@ -58,6 +62,7 @@ class Chapter:
     timings: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     comparisons: Sequence[TouchComparison] = ()
+    advice: str = ""
 
     @property
     def filter(self) -> History | None:
@@ -81,6 +86,18 @@ class Chapter:
         """Description that the model has of its making."""
         meta: Mapping[str, Any] = getattr(self.model, "meta", {})
         return meta
+
+    @cached_property
+    def learnt_from(self) -> np.ndarray:
+        """Inputs (N, n) of the solves that were learnt from, as far as they are known: their number is the one told."""
+        X = getattr(getattr(self.train, "ok", self.train), "X", None)
+        if X is None or np.ndim(X) != 2 or not len(X):
+            return np.zeros((0, 0))
+        if self.subject.solves is None or np.shape(X)[1] != self.subject.solves.X.shape[1]:
+            return np.asarray(X)
+        touching = np.asarray(X)[self.model.energy.baseline.coordinate(np.asarray(X)) > 0]
+        # later ones may have made no better surrogate
+        return np.asarray(touching[: int(self.meta.get("solves", len(touching)))])
 
     @property
     def origin(self) -> Mapping[str, Any]:

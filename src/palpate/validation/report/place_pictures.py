@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,7 +25,7 @@ def place_pictures(chapter: Chapter, key: str) -> list[Picture]:
     model, test = chapter.model, chapter.subject.solves
     if test is None or not isinstance(model, Surrogate) or model.energy.baseline.surface is None:
         return []
-    learnt = _inputs(chapter.train, test.X.shape[1])
+    learnt = chapter.learnt_from if chapter.learnt_from.shape[1] == test.X.shape[1] else test.X[:0]
     field = next((f for f in model.fields.values() if isinstance(f, FieldSurrogate)), None)
     told = f"{count(len(test.X), 'unseen solve')}"
     if len(learnt):
@@ -39,14 +39,6 @@ def place_pictures(chapter: Chapter, key: str) -> list[Picture]:
             lambda: plot_places(model.energy, learnt, test.X, field),
         )
     ]
-
-
-def _inputs(train: Any, columns: int) -> np.ndarray:
-    """Return the inputs (N, n) of the solves that were learnt from; none where they are not known."""
-    X = getattr(getattr(train, "ok", train), "X", None)
-    if X is None or np.ndim(X) != 2 or np.shape(X)[1] != columns:
-        return np.zeros((0, columns))
-    return np.asarray(X)
 
 
 def plot_places(

@@ -9,12 +9,19 @@ from dataclasses import dataclass
 from palpate.format import count, interval, length, plain, scientific, share
 from palpate.validation.figures.by_load import worse_than_filter
 from palpate.validation.figures.history_following import HistoryErrors
+from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
 from palpate.validation.report.body_words import body_words, solid_words, strain_words
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.subject import line_of
 from palpate.validation.validate import Validation
 
 __all__ = ["Fact", "Story", "felt", "story"]
+
+NOTICED = (
+    f"a difference of {share(FORCE_JND)}, or of {share(FAINT_JND)} below {plain(FAINT)} N "
+    "(Jones 1989; Pang, Tan & Durlach 1991)"
+)
+"""The just noticeable difference of a force in words."""
 
 
 @dataclass(frozen=True)
@@ -27,10 +34,15 @@ class Fact:
 
 @dataclass(frozen=True)
 class Story:
-    """One body in plain words: a verdict, figures that stand for many, and a paragraph on each of three subjects."""
+    """One body in plain words.
+
+    A verdict; a paragraph that says by what it was judged, how good it is for a hand, and what to do; figures that
+    stand for many; and a paragraph on each of three subjects.
+    """
 
     verdict: str
     passed: bool
+    lead: str
     facts: tuple[Fact, ...]
     solved: str
     learnt: str
@@ -43,9 +55,50 @@ def story(chapter: Chapter) -> Story:
     verdict = "Every limit kept" if v.passed else f"{len(v.failures)} of {len(v.checks)} limits missed"
     if v.caution:
         verdict += f" on only {count(v.samples, 'unseen solve')}"
+    facts = tuple(_facts(chapter))
     return Story(
-        verdict, v.passed, tuple(_facts(chapter)), _solves_in_words(chapter), _learnt(chapter), _good(v)
+        verdict, v.passed, _lead(chapter), facts, _solves_in_words(chapter), _learnt(chapter), _good(v)
     )
+
+
+def _lead(chapter: Chapter) -> str:
+    """Return what was judged, how good it is in words of a hand, and what to do, in one paragraph."""
+    v = chapter.validation
+    unseen = v.histories.count if v.histories is not None else v.samples
+    kind = ("history", "histories") if v.histories is not None else ("finite-element solve",)
+    learnt = len(chapter.learnt_from)
+    from_these = f"; it was learnt from {count(learnt, 'other solve')}" if learnt else ""
+    return (
+        f"The learnt body {chapter.name} is judged here by {count(unseen, *kind)} that it never saw{from_these}. "
+        f"{_felt_error(v)} {_what_to_do(chapter)}"
+    )
+
+
+def _felt_error(v: Validation) -> str:
+    """Return how far the force is off, measured by what a hand notices."""
+    if v.histories is not None:
+        return (
+            f"Its force is off by {share(v.histories.median)} of the largest at the median, and by at most "
+            f"{share(v.histories.p95)} for 95 of 100 samples. A hand notices {NOTICED}."
+        )
+    if v.force is None or v.force.p95 is None:
+        return "No touch in the test was strong enough to judge its force in relative terms."
+    return (
+        f"The force that a hand feels is off by {share(v.force.median)} at the median, and by at most "
+        f"{share(v.force.p95)} for 95 of 100 solves: {felt(v.force.p95_jnd)}. A hand notices {NOTICED}."
+    )
+
+
+def _what_to_do(chapter: Chapter) -> str:
+    """Return the next step for whoever reads the report."""
+    v = chapter.validation
+    if not v.passed and chapter.advice:
+        return f"To do: {chapter.advice}."
+    if not v.passed:
+        return "To do: see below which limits were missed and where; ask for less there, or solve more and learn again."
+    if v.caution:
+        return f"To do: judge it by more solves before you rely on it. {v.caution}"
+    return "Every limit is kept: it is ready to be touched (`palpate view`) and exported (`palpate export`)."
 
 
 def _facts(chapter: Chapter) -> Iterator[Fact]:
@@ -66,8 +119,8 @@ def _facts(chapter: Chapter) -> Iterator[Fact]:
         outputs = len(refined.per_output)
         yield Fact(count(refined.units, "unit"), f"of network “nodes” answer for {outputs} displacements")
         yield Fact(length(refined.rmse), f"RMSE at the nodes, {scientific(refined.relative)} of full scale")
-    if "solves" in chapter.meta:
-        yield Fact(count(int(chapter.meta["solves"]), "solve"), "to learn from")
+    if learnt := len(chapter.learnt_from) or int(chapter.meta.get("solves", 0)):
+        yield Fact(count(learnt, "solve"), "to learn from")
     if v.force is not None and v.force.p95 is not None:
         yield Fact(share(v.force.median), "force error at the median")
         yield Fact(share(v.force.p95), f"force error at most, for 95 of 100 solves: {felt(v.force.p95_jnd)}")
@@ -123,7 +176,7 @@ def _learnt(chapter: Chapter) -> str:
             f"{count(chapter.filter.passes, 'pass', 'passes')}, ended with {count(own.units, 'unit')} and came within "
             f"{length(own.rmse)} (root mean square). "
         )
-    solves = f" from {count(used, 'solve')}" if isinstance(used, int) else ""
+    solves = f" from {used} of them" if isinstance(used, int) and used != len(chapter.learnt_from) else ""
     return (
         f"{text}Refinement{solves} gave the network “nodes” {count(refined.units, 'unit')}, and it came within "
         f"{length(refined.rmse)}; the largest error at any node is {length(refined.max)} ({refined.worst})."
@@ -151,13 +204,7 @@ def _good(v: Validation) -> str:
         )
     if v.histories is not None:
         parts.append(_good_histories(v.histories))
-    elif v.force is None or v.force.p95 is None:
-        parts.append("No touch in the test was strong enough to judge its force in relative terms.")
-    else:
-        parts.append(
-            f"The force that a hand feels is off by {share(v.force.median)} at the median and by at most "
-            f"{share(v.force.p95)} for 95 of 100 solves: {felt(v.force.p95_jnd)}."
-        )
+    elif v.force is not None and v.force.p95 is not None:
         if v.stiffness is not None:
             parts.append(f"The stiffness is off by at most {share(v.stiffness.p95)} for 95 of 100.")
         if v.force.direction_p95 is not None:
@@ -174,8 +221,8 @@ def _good(v: Validation) -> str:
 
 def _good_histories(errors: HistoryErrors) -> str:
     text = (
-        f"The force is off by {share(errors.median)} of the largest at the median and by at most {share(errors.p95)} "
-        f"for 95 of 100 samples; without a memory by {share(errors.elastic_median)} and {share(errors.elastic_p95)}."
+        f"Without a memory its force would be off by {share(errors.elastic_median)} at the median and by "
+        f"{share(errors.elastic_p95)} for 95 of 100 samples."
     )
     if errors.residual_median is not None and errors.residual_largest is not None:
         text += (

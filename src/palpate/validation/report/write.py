@@ -12,6 +12,7 @@ from palpate.errors import UsageError
 from palpate.files import system_errors, writing
 from palpate.format import bind_units
 from palpate.output_files import free_path, with_seal
+from palpate.validation.report.body_pictures import body_pictures
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.hand_pictures import hand_pictures
 from palpate.validation.report.history_pictures import history_pictures
@@ -129,6 +130,7 @@ def report_context(chapter: Chapter, key: str) -> dict[str, Any]:
         "key": key,
         "name": chapter.name,
         "story": story(chapter),
+        "body": body_pictures(chapter, key),
         "pictures": pictures(chapter, key),
         "checks": check_rows(v),
         "failures": [str(c) for c in v.failures],

@@ -3,7 +3,7 @@
 import { fixed, tidy, worded } from "./units";
 
 const ROWS = 80; // of one group
-const FIRST = ["validation", "errors", "limits", "warnings"]; // groups that matter most stand first and open
+const FIRST = ["validation", "errors of solves left out of learning in turn", "limits", "warnings"]; // groups that matter most stand first and open
 const HASH = /^[0-9a-f]{32,}$/;
 const UNITS: Record<string, readonly [unit: string, factor: number]> = {
   young: ["GPa", 1e-9],
@@ -39,7 +39,7 @@ export function about(hello: Known, own: Row[]): void {
 function figures(hello: Known): Row[] {
   return [
     ["force limit", `${tidy(hello.max_force)} N`],
-    ["hand to body", `1 : ${tidy(hello.scale)}`],
+    ["1 mm of the hand is", `${tidy(hello.scale)} mm at the body`],
   ];
 }
 

@@ -77,8 +77,6 @@ export class Panel {
       [hello.holds ? "largest trained displacement" : "deepest trained press", measured(hello.deepest, "m")],
       ["largest trained force", `${tidy(hello.force_max)} N`],
       ["largest trained stiffness", `${tidy(hello.stiffness_max)} N/m`],
-      ...(hello.line ? [["nodes", String(hello.line.rest.length)] as const] : []),
-      ...hello.fields.map((info) => [info.name, `${info.modes} modes`] as const),
     ]);
   }
 

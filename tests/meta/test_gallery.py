@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ast
+import importlib.machinery
 import importlib.metadata
+import importlib.util
 import json
 import re
 import shlex
 import tomllib
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 import yaml
@@ -68,3 +71,33 @@ def test_the_citation_is_complete():
     for reference in cited["references"]:
         assert reference["type"] in {"article", "conference-paper"}
         assert isinstance(reference["year"], int)
+
+
+@pytest.fixture(scope="module")
+def build() -> ModuleType:
+    """The script docs/build, which has no ending."""
+    loader = importlib.machinery.SourceFileLoader("docs_build", str(ROOT / "docs" / "build"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("docs_build", loader))
+    loader.exec_module(module)
+    return module
+
+
+def test_a_page_is_made_anew_only_of_other_content(build: ModuleType, tmp_path: Path):
+    made = []
+
+    def make(folder: Path) -> None:
+        made.append(list(folder.iterdir()))
+        (folder / "page.html").write_text("page", encoding="utf-8")
+
+    for content in ("first", "first", "second", "second"):
+        assert build._is_made(tmp_path / "body", "page.html", content, make)
+    assert made == [[], []]
+
+
+def test_what_failed_is_tried_again(build: ModuleType, tmp_path: Path):
+    def fail(folder: Path) -> None:
+        (folder / "page.html").write_text("half a page", encoding="utf-8")
+        raise RuntimeError("no")
+
+    assert not build._is_made(tmp_path / "body", "page.html", "content", fail)
+    assert not build._is_made(tmp_path / "body", "page.html", "content", fail)

@@ -295,7 +295,7 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
     server.show_body(versions[0])
     server.show_progress(first)
     page.wait_for_selector("html[data-touching='1'][data-tick][data-middle]")
-    page.wait_for_function("document.getElementById('error-p95').textContent === '3.1'")
+    page.wait_for_selector("#error-p95:text-is('3.1')")
     assert 41 <= int(page.inner_text("#elapsed").split()[0]) < 60
     page.wait_for_function("document.getElementById('remaining').textContent === ', a little longer'")
 
@@ -315,7 +315,7 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
 
     server.show_body(versions[1])
     server.show_progress(dataclasses.replace(first, error_p95=0.028, solves=24))
-    page.wait_for_function("document.getElementById('error-p95').textContent === '2.8'")
+    page.wait_for_selector("#error-p95:text-is('2.8')")
     assert page.inner_text("#improved") == "", "other solves judge the same body"
     words = "improved: 2.8 % → 2.2 % on the same 20 unseen solves"
     server.show_progress(dataclasses.replace(first, error_p95=0.022, solves=24, trial=words))

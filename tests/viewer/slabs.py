@@ -16,7 +16,14 @@ from palpate.surrogates import (
     LearntEnergy,
     Surrogate,
 )
-from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
+from palpate.surrogates.fields import (
+    CarriedSurface,
+    DepthAmplitude,
+    LocalMode,
+    Variation,
+    quadratic_triangles,
+    quartered,
+)
 from palpate.surrogates.fields.local_mode import design
 from palpate.surrogates.memories import Indentation, Relaxation
 from palpate.units import Quantity, Range
@@ -50,8 +57,24 @@ def touched_slab(**more: object) -> Surrogate:
     return replace(body, fields=fields)
 
 
-def _field(energy, components: int) -> FieldSurrogate:
-    points, triangles = box()
+def carried_slab() -> Surrogate:
+    """The slab on coarse triangles of six nodes, which carry a fine surface of its own."""
+    body, (points, triangles) = touched_slab(), box(8)
+    edges, cells = quadratic_triangles(triangles, len(points))
+    nodes = np.concatenate([points, points[edges].mean(axis=1)])
+    own = CarriedSurface.bind(*box(30), nodes, cells)
+    shown = {"displacement": 3, "largest stretch": 1}
+    fields = {name: _field(body.energy, k, (nodes, quartered(cells)), own) for name, k in shown.items()}
+    return replace(body, fields=fields)
+
+
+def _field(
+    energy,
+    components: int,
+    mesh: tuple[np.ndarray, np.ndarray] | None = None,
+    drawn: CarriedSurface | None = None,
+) -> FieldSurrogate:
+    points, triangles = box() if mesh is None else mesh
     nodes = len(points)
     mass = np.full(nodes, 1.0 / nodes)
     # the middle sinks, the sides bulge; nothing moves at the bottom
@@ -78,6 +101,7 @@ def _field(energy, components: int) -> FieldSurrogate:
         surface=energy.baseline.surface,
         radius=pressed.RADIUS,
         local_mode=LocalMode(_table(components), 0.03, 1e-4, _variation(components)),
+        drawn=drawn,
     )
 
 

@@ -124,6 +124,11 @@ def _surface_coords(layout: Layout) -> dict[str, Any]:
     if layout.surface_of is not None:
         coords["surface"] = ("surface", _text(layout.surfaces))
         coords["surface_of"] = ("triangle", np.asarray(layout.surface_of, dtype=np.int64))
+    if layout.drawn is not None:
+        points, own = layout.drawn
+        meaning = _attrs("m", "vertices at rest of the body's own surface, which is drawn")
+        coords["drawn_points"] = (("drawn_node", "axis"), np.asarray(points, dtype=float), meaning)
+        coords["drawn_triangles"] = (("drawn_triangle", "corner"), np.asarray(own, dtype=np.int64))
     return coords
 
 

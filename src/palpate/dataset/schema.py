@@ -29,7 +29,8 @@ FORMAT = "palpate dataset"
 FORMAT_VERSION = 3  # 1: plane beams only; up to 2: chunks and arrays without a checksum of their own
 TIMINGS = frozenset({"solve_seconds"})  # differ from run to run: no part of a dataset's identity
 
-RESERVED = frozenset({"inputs", "sample", "rest", "triangles"})  # variables that every dataset has of itself
+# variables that every dataset has of itself
+RESERVED = frozenset({"inputs", "sample", "rest", "triangles", "drawn_points", "drawn_triangles"})
 
 _CONJUGATES = {"m": "N", "N": "m", "rad": "N m", "N m": "rad", "Pa": "m³", "N/m²": "m³"}
 
@@ -129,7 +130,9 @@ def beam_fields(nodes: int) -> tuple[Field, ...]:
     )
 
 
-def solid_fields(nodes: int, ranges: Sequence[Range], *, stress: bool = False) -> tuple[Field, ...]:
+def solid_fields(
+    nodes: int, ranges: Sequence[Range], *, stress: bool = False, edges: int = 0
+) -> tuple[Field, ...]:
     """Return the fields that a solid with so many nodes answers under an interaction with n inputs.
 
     With U(q) the least energy of body and interaction at the inputs q, less that without contact, the response
@@ -143,13 +146,19 @@ def solid_fields(nodes: int, ranges: Sequence[Range], *, stress: bool = False) -
         Inputs of the interaction; their units decide those of the response.
     stress : bool
         True adds the von Mises stress at the nodes, ``"von_mises"``.
+    edges : int
+        Number of the surface's edges, in whose middles the displacement is answered too, ``"mid_displacement"``; by
+        default it is not.
     """
     n, units = len(ranges), [conjugate_unit(r.unit) for r in ranges]
     slopes = {f"{unit}/{r.unit}" for unit in units for r in ranges}
     slope = slopes.pop() if len(slopes) == 1 else "unit of the response per unit of the input"
     von_mises = Field("von_mises", ("node",), (nodes,), "Pa", "von Mises stress")
+    meaning = "offset of the middles of the surface's edges, sorted by their nodes"
+    middles = Field("mid_displacement", ("edge", "component"), (edges, 3), "m", meaning)
     return (
         Field("displacement", ("node", "component"), (nodes, 3), "m", "offset from the rest position"),
+        *((middles,) if edges else ()),
         *((von_mises,) if stress else ()),
         Field("potential_energy", unit="J", meaning="energy U of body and interaction, without contact 0"),
         Field("strain_energy", unit="J", meaning="energy in the body: elastic, and the plastic work"),
@@ -192,6 +201,9 @@ class Layout:
         Names of the parts of the surface.
     surface_of : (t,) array of int, optional
         For each triangle the index of its part in `surfaces`.
+    drawn : pair of (p, 3) array and (q, 3) array of int, optional
+        Points in m and triangles of the body's own surface at full detail, which pictures show; by default they show
+        `triangles`.
     labels : mapping of a dimension to names, optional
         For further dimensions of the answers; by default ``{"reaction": ("F_x", "F_y", "M")}`` in the plane.
 
@@ -211,6 +223,7 @@ class Layout:
     surfaces: tuple[str, ...] = ()
     surface_of: np.ndarray | None = None
     labels: Mapping[str, Sequence[str]] | None = None
+    drawn: tuple[np.ndarray, np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         def fill(name: str, value: object) -> None:

@@ -239,6 +239,7 @@ def _recognise_pressed(
             radius=pressed.radius,
             radius_input=pressed.radius_input,
             options=field,
+            drawn=pressed.drawn,
         )
 
     baseline = pressed.baseline

@@ -328,9 +328,12 @@ class _Record:
     def read(self, stored: Any, path: str, parts: _Parts) -> Any:
         if (shared := parts.same(stored, self.cls)) is not None:
             return shared
-        if not isinstance(stored, Mapping) or stored.keys() != self.forms.keys():
+        # a file of before lacks what was added since, which is optional
+        missing = self.forms.keys() - stored.keys() if isinstance(stored, Mapping) else self.forms.keys()
+        added = all(isinstance(self.forms[k], _Maybe) and getattr(self.cls, k, 0) is None for k in missing)
+        if not isinstance(stored, Mapping) or not added or stored.keys() - self.forms.keys():
             raise ValueError(f"{path or 'it'} is not described as a {self.cls.__name__}")
-        given = {k: form.read(stored[k], _join(path, k), parts) for k, form in self.forms.items()}
+        given = {k: self.forms[k].read(stored[k], _join(path, k), parts) for k in self.forms if k in stored}
         value = parts.values[path] = self.cls(**given)
         return value
 

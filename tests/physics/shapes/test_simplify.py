@@ -85,7 +85,7 @@ def test_borders_of_labels_stay():
 def test_large_files_are_simplified_and_told(tmp_path: Path):
     ball = trimesh.creation.icosphere(subdivisions=5, radius=50)
     ball.export(path := tmp_path / "ball.stl")
-    topology, surface = read_surface(path, "mm")
+    topology, surface, _ = read_surface(path, "mm")
     assert len(topology.faces) == len(surface.triangles) <= 20_000
     assert topology.volume == pytest.approx(ball.volume * 1e-9, rel=1e-4)
     assert "20,480 triangles were simplified to" in surface.notes[0]

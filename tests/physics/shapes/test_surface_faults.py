@@ -58,7 +58,7 @@ def refused(shape: ImportedSolid, kind=UsageError) -> str:
 def repaired(shape: ImportedSolid, volume: float = VOLUME, rel: float = 1e-9) -> str:
     """The notes about a surface that encloses this volume after its repair."""
     with pytest.warns(ModelWarning, match="read with repairs"):
-        topology, surface = read_surface(shape.path, "mm")
+        topology, surface, _ = read_surface(shape.path, "mm")
     assert topology.volume == pytest.approx(volume, rel=rel)
     with pytest.warns(ModelWarning, match="read with repairs"):
         assert surface.notes == shape.notes

@@ -22,6 +22,7 @@ from palpate.options import FieldOptions, takes
 from palpate.rbf.freezing import freeze_refined, training_record
 from palpate.rbf.sample_checks import numbers
 from palpate.surrogates import FieldSurrogate, TouchedSurface
+from palpate.surrogates.fields import CarriedSurface
 from palpate.surrogates.fields.depth_amplitude import AMPLITUDES
 from palpate.units import Quantity, Range, bounds
 
@@ -72,9 +73,12 @@ def learn_snapshots(
     radius: float,
     radius_input: int | None = None,
     rest: np.ndarray | None = None,
+    drawn: CarriedSurface | None = None,
     options: FieldOptions,
 ) -> LearntField:
     """Learn a field on a mesh from snapshots on the meshes that they were solved on; the context is `learn_field`'s.
+
+    `drawn` is the body's own surface, which the mesh carries in pictures.
 
     Raises
     ------
@@ -113,6 +117,7 @@ def learn_snapshots(
         radius_input=radius_input,
         local_mode=best.local_mode,
         meta=meta,
+        drawn=drawn,
     )
     return LearntField(field, trials, best.truncation, best.truncation_left_out, error)
 

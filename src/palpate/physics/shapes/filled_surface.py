@@ -39,12 +39,12 @@ FLAT = 1e-7  # thickness over length below which a surface lies in a plane
 SHARP = 0.05
 
 
-def read_surface(path: str, unit: str, simplify: float | None = None) -> tuple[Trimesh, Surface]:
+def read_surface(path: str, unit: str, simplify: float | None = None) -> tuple[Trimesh, Surface, Surface]:
     """Read the surface of a file, repaired, simplified if it is large, and searched for faults.
 
     `unit` is a key of `UNITS`. `simplify` is the distance in m by which a surface of more than 20,000 triangles may
     be simplified; by default 1/2,000 of its length, 0 for not at all. Returns the surface with its edges, in m, and
-    the same with the names of the file's parts and a note about each repair.
+    the same with the names of the file's parts and a note about each repair, and the surface before it was simplified.
     """
     surface = parse_surface(path)
     surface = replace(surface, points=surface.points * UNITS[unit])
@@ -53,7 +53,7 @@ def read_surface(path: str, unit: str, simplify: float | None = None) -> tuple[T
     surface = _turn_outwards(repair_surface(surface))
     topology, whole = _simplify(path, surface, simplify)
     tell_repairs(path, surface.notes)
-    return topology, whole
+    return topology, whole, surface
 
 
 def _require_thickness(path: str, surface: Surface) -> None:

@@ -154,6 +154,11 @@ class BodyMesh:
         numbers = [self.surfaces.index(name) for name in members(surface, self.surfaces)]
         return np.isin(self.surface_of, numbers)
 
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """Nodes (m, 2) of the edges of the outer surface, each pair and all pairs in rising order."""
+        return np.unique(np.sort(self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+
     def triangles_of(self, surface: str) -> np.ndarray:
         """Nodes of the triangles of a surface, shape (t, 3); `UsageError` if there is no such surface."""
         return np.asarray(self.triangles[self.on(surface)])

@@ -103,6 +103,7 @@ class Shape:
     """
 
     curved: ClassVar[bool] = False  # whether elements shall follow the surface between their vertices
+    drawn_apart: ClassVar[bool] = False  # whether pictures show a surface of its own, `drawn`
     foreign: ClassVar[bool] = False  # whether another program's file decides it, which may crash the mesher
 
     @property
@@ -167,6 +168,11 @@ class Shape:
     def skin(self) -> BodyMesh:
         """Triangles of the outer surface, with the names of the surfaces."""
         return self.rest()
+
+    @property
+    def drawn(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Points (p, 3) in m and triangles (q, 3) of its own surface for pictures, where elements are coarser."""
+        return None
 
     @property
     def faces(self) -> tuple[Face, ...]:

@@ -8,6 +8,8 @@ from os import fspath
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.file_kinds import part_kind
@@ -28,8 +30,12 @@ from palpate.physics.shapes.meshing import GRADING, FineMesh, mesh_solid
 from palpate.physics.shapes.naming import INTERFACE
 from palpate.physics.shapes.shape import Shape
 from palpate.physics.shapes.step_patches import FacePatches
+from palpate.physics.shapes.surface_repair import is_manifold
+from palpate.physics.shapes.surface_simplify import TOLERANCE, simplify_surface
 
 __all__ = ["ImportedSolid"]
+
+MOST_DRAWN = 100_000  # triangles of a surface that pictures show: a page draws them without a stop
 
 
 @dataclass(frozen=True)
@@ -134,6 +140,19 @@ class ImportedSolid(Shape):
         return super().skin if self.is_cad else _skin(self)[0]
 
     @property
+    def drawn_apart(self) -> bool:  # type: ignore[override]  # a class variable of shapes of one kind
+        """True where pictures show the file's own triangles: elements of a surface's file are coarser."""
+        return not self.is_cad
+
+    @property
+    def drawn(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Points (p, 3) in m and triangles (q, 3) of a surface's file, at most 100,000; None for a CAD file.
+
+        A larger surface is simplified within 1/2,000 of its length.
+        """
+        return None if self.is_cad else _drawn(self.path, self.digest, self.unit or "m", self.simplify)
+
+    @property
     def regions(self) -> tuple[str, ...]:
         """Names of the solids, or ``body``."""
         if not self.is_cad:
@@ -209,13 +228,22 @@ def _read_names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...],
 @lru_cache(maxsize=8)
 def _skin(shape: ImportedSolid) -> tuple[BodyMesh, float, tuple[str, ...]]:
     """Named surface of a file, the volume in it in m³, and notes about repairs."""
-    topology, surface = _whole_surface(shape.path, shape.digest, shape.unit or "m", shape.simplify)
+    topology, surface, _ = _whole_surface(shape.path, shape.digest, shape.unit or "m", shape.simplify)
     skin = name_parts(topology, surface, shape.patches, shape.feature_angle)
     return skin, float(topology.volume), (*surface.notes, *bodies_apart(topology))
 
 
 @lru_cache(maxsize=2)
-def _whole_surface(path: str, digest: str, unit: str, simplify: float | None) -> tuple[Any, Any]:
+def _drawn(path: str, digest: str, unit: str, simplify: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """Points and triangles of a file's surface for pictures."""
+    surface = _whole_surface(path, digest, unit, simplify)[2]
+    if len(surface.triangles) > MOST_DRAWN and is_manifold(surface.triangles):
+        surface = simplify_surface(surface, TOLERANCE * surface.length, MOST_DRAWN)
+    return surface.points, surface.triangles
+
+
+@lru_cache(maxsize=2)
+def _whole_surface(path: str, digest: str, unit: str, simplify: float | None) -> tuple[Any, Any, Any]:
     """Surface of a file, which all patches of it share: large ones take seconds to simplify."""
     require_same(path, digest)
     return read_surface(path, unit, simplify)

@@ -134,13 +134,18 @@ class SolidProblem:
         """Nodes at rest and the surface's triangles; a sweep asks for it."""
         mesh = self.mesh
         return Layout(
-            mesh.points, triangles=mesh.triangles, surfaces=mesh.surfaces, surface_of=mesh.surface_of
+            mesh.points,
+            triangles=mesh.triangles,
+            surfaces=mesh.surfaces,
+            surface_of=mesh.surface_of,
+            drawn=getattr(self.body.geometry, "drawn", None),
         )
 
     @property
     def schema(self) -> tuple[Field, ...]:
         """Fields of each answer; a sweep asks for it."""
-        return solid_fields(len(self.mesh.points), self.ranges, stress=self.stress)
+        edges = len(self.mesh.edges) if getattr(self.body.geometry, "drawn_apart", False) else 0
+        return solid_fields(len(self.mesh.points), self.ranges, stress=self.stress, edges=edges)
 
     @property
     def design_name(self) -> str | None:

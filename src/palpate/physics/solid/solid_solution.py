@@ -122,6 +122,15 @@ class SolidSolution:
         return self.stop is Stop.CONVERGED
 
     @property
+    def mid_displacement(self) -> np.ndarray:
+        """Displacements (m, 3) in the middles of the edges of the mesh's surface, m; NaN unless converged."""
+        if self.mid_sides is None:
+            return np.full((len(self.mesh.edges), 3), np.nan)
+        size = len(self.mesh.points)
+        every, own = (edges @ (size, 1) for edges in (self.mid_sides.edges, self.mesh.edges))
+        return np.asarray(self.mid_sides.displacement[np.searchsorted(every, own)])
+
+    @property
     def inside(self) -> bool:
         """True where all inputs are within their ranges; beyond them the mesh may be coarse where it is touched."""
         return not self._beyond()

@@ -24,6 +24,7 @@ from palpate.network import Network
 from palpate.network.network_kernels import Precision
 from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.continuation import Continuation
+from palpate.surrogates.fields.carried_surface import CarriedSurface
 from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
 from palpate.surrogates.fields.field_evaluator import FieldEvaluator
 from palpate.surrogates.fields.field_kernels import moving_values, profile_arguments
@@ -134,6 +135,8 @@ class FieldSurrogate:
         How far b is followed beyond its training; of the network's ranges and the amplitude's depth unless given.
     meta : mapping
         JSON-able.
+    drawn : CarriedSurface, optional
+        The body's own surface at full detail, which pictures show; by default they show the field's own triangles.
 
     Raises
     ------
@@ -156,6 +159,7 @@ class FieldSurrogate:
     radius_input: int | None = None
     continuation: Continuation | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
+    drawn: CarriedSurface | None = None
 
     def __post_init__(self) -> None:
         own_arrays(self, *_ARRAYS)
@@ -195,7 +199,7 @@ class FieldSurrogate:
             return f"its probe has a radius of {self.radius} m"
         if self.continuation is not None and self.continuation.widths.shape != (n,):
             return f"its continuation has {self.continuation.widths.size} widths for {n} inputs"
-        return self._fault_of_local_mode()
+        return self._fault_of_local_mode() or (self.drawn.fault_beside(corners) if self.drawn else "")
 
     def _fault_of_local_mode(self) -> str:
         wanted, local_mode = {1: 1, 3: 2}.get(self.rest.shape[1]), self.local_mode

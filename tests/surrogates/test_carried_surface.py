@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from touch_made import touch_energy
 
+from palpate.dataset.carried_surface import CarriedSurface, quadratic_triangles, quartered
 from palpate.errors import UsageError
 from palpate.surrogates import FieldSurrogate, Surrogate
-from palpate.surrogates.fields import CarriedSurface, quadratic_triangles, quartered
 
 RADIUS = 0.05
 

@@ -8,6 +8,7 @@ import numpy as np
 
 import pressed
 from models import linear_network
+from palpate.dataset.carried_surface import CarriedSurface, quadratic_triangles, quartered
 from palpate.surrogates import (
     ContactBaseline,
     ContactLaw,
@@ -16,14 +17,7 @@ from palpate.surrogates import (
     LearntEnergy,
     Surrogate,
 )
-from palpate.surrogates.fields import (
-    CarriedSurface,
-    DepthAmplitude,
-    LocalMode,
-    Variation,
-    quadratic_triangles,
-    quartered,
-)
+from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.surrogates.fields.local_mode import design
 from palpate.surrogates.memories import Indentation, Relaxation
 from palpate.units import Quantity, Range

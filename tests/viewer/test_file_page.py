@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from chromium_page import assert_no
 from playwright.sync_api import Browser, Page
-from slabs import dents, family, touched_slab
+from slabs import carried_slab, dents, family, touched_slab
 
 from palpate.errors import UsageError
 from palpate.runtime.touchable import touchable
@@ -36,7 +36,7 @@ PARTS = """() => {
   const { surface: { rest, triangles, touchable }, fields } = palpate;
   const list = (numbers) => Array.from(numbers);
   const all = fields.map((field) =>
-    Object.fromEntries(["rest", "modes", "touched"].map((name) => [name, list(field[name])])));
+    Object.fromEntries(["rest", "modes", "touched", "shares"].map((name) => [name, list(field[name])])));
   return { rest: list(rest), triangles: list(triangles), touchable: list(touchable), fields: all };
 }"""
 KEPT = """() => {
@@ -206,6 +206,33 @@ def test_the_surface_and_its_fields_are_those_of_the_body(
         off += np.reshape(field["rest"], (len(rest), -1)) - own.rest[nodes]
         assert np.abs(off).max() <= 1e-4 * np.abs(own.values(X) - own.rest).max()
         assert set(np.array(field["touched"], dtype=int)) == set(np.flatnonzero(own.touched[nodes]))
+
+
+@pytest.mark.full
+def test_a_page_carries_the_body_s_own_surface(browser: Browser, tmp_path: Path):
+    body = carried_slab()
+    done = export_html(body, tmp_path / "carried.html")
+    page, complaints = open_file(browser, done.file)
+    got, shown = page.evaluate(PARTS), body.fields["displacement"]
+    points, triangles = shown.pictured
+    rest = np.reshape(got["rest"], (-1, 3))
+    nodes = nearest_nodes(rest, points)
+    assert np.abs(rest - points[nodes]).max() < 1e-5 * np.ptp(points)
+    assert turned(nodes[np.reshape(got["triangles"], (-1, 3)).astype(int)]) == turned(triangles)
+    X = deep_touches(body)
+    for own, field in zip(body.fields.values(), got["fields"], strict=True):
+        modes = np.reshape(field["modes"], (len(own.modes), len(rest), -1))
+        off = np.tensordot(own.coefficients(X), modes - own.at_pictured(own.modes)[:, nodes], axes=1)
+        off += np.reshape(field["rest"], (len(rest), -1)) - own.at_pictured(own.rest)[nodes]
+        # a binding's weights have steps of 1/2,048 of a triangle's side, an eighth of the slab
+        assert np.abs(off).max() <= 1e-3 * np.abs(own.values(X) - own.rest).max()
+        shares = own.at_pictured(own.touched[:, None].astype(float))[nodes, 0]
+        sparse = np.zeros(len(rest))
+        sparse[np.array(field["touched"], dtype=int)] = field["shares"]
+        np.testing.assert_allclose(sparse, shares, rtol=0, atol=2e-3)
+    press(page)
+    assert_no(complaints)
+    page.context.close()
 
 
 @pytest.mark.full

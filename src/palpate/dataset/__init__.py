@@ -4,6 +4,7 @@
 
     dataset.py   Dataset: the frozen value, its arrays by name, its rows taken, split and joined
     schema.py    Field, Layout: the quantities that a solver answers, and the nodes that they belong to
+    carried_surface.py  a body's own surface at full detail, bound to the elements on which solves are known
     assemble.py  inputs and answers, labelled and joined into a dataset
     store.py     a dataset on disk, with a checksum
     dataset_tables.py  the same as CSV, Parquet and netCDF, for other tools

@@ -12,10 +12,18 @@ from xml.etree import ElementTree
 import numpy as np
 
 from palpate.dataset import Dataset
+from palpate.dataset.carried_surface import (
+    CarriedSurface,
+    has_middles,
+    quartered,
+    surface_nodes,
+    surface_values,
+)
 from palpate.errors import UsageError
 from palpate.export.gltf import MOST_TARGETS, ShapeSeries, write_glb
 from palpate.files import writing, writing_folder
 from palpate.output_files import require_outputs, seal
+from palpate.surrogates import FieldSurrogate
 
 __all__ = ["SHAPES", "series_of_dataset", "series_of_surrogate", "write_shapes", "write_vtu_series"]
 
@@ -123,6 +131,17 @@ def series_of_dataset(data: Dataset, rows: Sequence[int] | None = None, name: st
     points, u = (_upright(data.rest), _upright(u[..., :2])) if flat else (data.rest, u)
     cells = _pieces(data.rest[:, 0]) if "triangles" not in data else data.triangles
     fields = {"von Mises stress": data["von_mises"][kept]} if "von_mises" in data else {}
+    if has_middles(good := data.take(kept)):
+        nodes, parts = surface_nodes(data.rest, data.triangles, middles=True)
+        own = CarriedSurface.bind(data["drawn_points"], data["drawn_triangles"], nodes, parts)
+        points, cells = own.points, own.triangles
+        known = {"u": "displacement"} | ({"von Mises stress": "von_mises"} if fields else {})
+        carried = {
+            key: own.carry(surface_values(good, name, middles=True), quartered(parts))
+            for key, name in known.items()
+        }
+        u = carried.pop("u")
+        fields = {name: values[..., 0] for name, values in carried.items()}
     order = np.arange(len(kept), dtype=float) if rows is not None else kept.astype(float)
     return ShapeSeries(points, cells, u, order, name, fields)
 
@@ -136,16 +155,15 @@ def series_of_surrogate(surrogate: Any, X: np.ndarray) -> ShapeSeries:
             why="It was learnt without its displacement.",
             fix="Learn it with shape=True.",
         )
-    u, points = np.asarray(shown.values(X)), np.asarray(shown.points)
-    triangles = getattr(shown, "triangles", None)
-    if triangles is None:
-        cells = _pieces(points[:, 0])
-        points, u = _upright(points[:, :2]), _upright(u[..., :2])
+    u = np.asarray(shown.values(X))
+    if isinstance(shown, FieldSurrogate):
+        (points, cells), u = shown.pictured, shown.at_pictured(u)
     else:
-        cells = np.asarray(triangles)
+        cells = _pieces(shown.points[:, 0])
+        points, u = _upright(shown.points[:, :2]), _upright(u[..., :2])
     fields = {}
     if (stress := surrogate.fields.get("von_mises")) is not None:
-        fields["von Mises stress"] = np.asarray(stress.values(X))[..., 0]
+        fields["von Mises stress"] = stress.at_pictured(np.asarray(stress.values(X)))[..., 0]
     return ShapeSeries(points, cells, u, np.arange(1.0, len(u) + 1), surrogate.name, fields)
 
 

@@ -9,6 +9,13 @@ from typing import Any
 import numpy as np
 
 from palpate.dataset import Dataset, Layout
+from palpate.dataset.carried_surface import (
+    CarriedSurface,
+    has_middles,
+    quartered,
+    surface_nodes,
+    surface_values,
+)
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
@@ -16,7 +23,6 @@ from palpate.learning.fields import Snapshots, lumped_mass
 from palpate.learning.kept_surface import touched_surface
 from palpate.surrogates import ContactBaseline, ContactLaw, Solves, TouchedSurface
 from palpate.surrogates.baselines import depth_series
-from palpate.surrogates.fields import CarriedSurface, quadratic_triangles, quartered
 from palpate.units import Range
 
 __all__ = ["FEWEST", "PressedSolves", "is_pressed"]
@@ -80,9 +86,9 @@ class PressedSolves:
                 fix=f"Sweep at least {FEWEST}, better 40 or more.",
             )
         rest, triangles, touched = _surface(data, layout, str(probe["touches"]))
-        points, own = _surface_nodes(rest, triangles, _has_middles(data))
+        points, own = surface_nodes(rest, triangles, has_middles(data))
         drawn = None
-        if _has_middles(data):
+        if has_middles(data):
             shown = data["drawn_points"], data["drawn_triangles"]
             drawn = CarriedSurface.bind(*shown, points, own)
         which, radius = _radius_input(data), float(probe["radius"])
@@ -138,10 +144,10 @@ class PressedSolves:
         depth series are drawn at random, which the seed decides.
         """
         data, series = self.data, self.depth_series
-        points, own = _surface_nodes(data.rest, data.triangles, self.drawn is not None)
+        points, own = surface_nodes(data.rest, data.triangles, self.drawn is not None)
         triangles = own if self.drawn is None else quartered(own)
         mass = lumped_mass(points, triangles)
-        solved = self._solved(name)
+        solved = surface_values(data, name, self.drawn is not None)
         images = []
         for matrix, some in zip(self.matrices, _drawn(series, len(self.matrices), most, seed), strict=True):
             rows = np.flatnonzero(np.isin(series, some))
@@ -155,33 +161,6 @@ class PressedSolves:
             around = triangles if np.linalg.det(matrix) > 0 else triangles[:, ::-1]
             images.append(Snapshots(X, values, series[rows], places, mass, around))
         return images
-
-    def _solved(self, name: str) -> np.ndarray:
-        """Return a field (N, nodes, components) of all solves at the nodes of the surface."""
-        data = self.data
-        values = np.asarray(data[name]).reshape(len(data), len(data.rest), -1)
-        nodes = np.unique(data.triangles)
-        if self.drawn is None:
-            return values[:, nodes]
-        edges, _ = quadratic_triangles(data.triangles, 0)
-        middles = data["mid_displacement"] if name == "displacement" else values[:, edges].mean(axis=2)
-        return np.concatenate([values[:, nodes], middles], axis=1)
-
-
-def _has_middles(data: Dataset) -> bool:
-    """Return whether all rows have what carries the body's own surface; those of earlier versions have not."""
-    known = "mid_displacement" in data and "drawn_points" in data
-    return known and bool(np.isfinite(data["mid_displacement"]).all())
-
-
-def _surface_nodes(rest: np.ndarray, triangles: np.ndarray, middles: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return the surface's nodes (n, 3) at rest, m, and its triangles (t, 3), or (t, 6) with middles of edges."""
-    nodes, own = np.unique(triangles, return_inverse=True)
-    points, own = rest[nodes], own.reshape(-1, 3)
-    if not middles:
-        return points, own
-    edges, cells = quadratic_triangles(own, len(points))
-    return np.concatenate([points, points[edges].mean(axis=1)]), cells
 
 
 def _deepest(probe: Mapping[str, Any]) -> float:

@@ -34,9 +34,10 @@ from palpate.runtime.touchable import touchable
 from palpate.surrogates import FieldSurrogate, Surrogate
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.viewer.about_record import about_record
-from palpate.viewer.messages import Hello
+from palpate.viewer.messages import Hello, Modes
 from palpate.viewer.packed_surface import PackedSurface, rounded_points
 from palpate.viewer.page_model import PageModel
+from palpate.viewer.surface_drawing import SurfaceDrawing
 
 __all__ = ["ExportedPage", "export_html", "html_page"]
 
@@ -124,7 +125,11 @@ class _Page:
         traits = device_traits("page")
         place = model.body.workspace(traits.radius)
         hello = model.hello(_Settings(place.scale, place.radius, traits.max_force), RATE)
-        surface = PackedSurface.of(model.surface, _step(np.asarray(model.surface.rest), hello))
+        # what carries the body's own surface, where there is one
+        coarse = SurfaceDrawing(model.body, detail=False)
+        step = _step(np.asarray(model.surface.rest), hello)
+        surface = PackedSurface.of(coarse.surface, step)
+        drawn, own_parts = _drawn(model, surface, step)
         keys = {field.name: key for key, field in surrogate.fields.items()}
         names = [info.name for info in hello.fields]
         block = WeightsBlock.of(surrogate, field=keys[names[0]] if names else None)
@@ -133,12 +138,13 @@ class _Page:
             "surface": _packed(surface.data),
             "core": _packed(built_core("core.wasm")),
             "weights-0": _packed(_by_weight(bare.to_bytes())),
+            **own_parts,
         }
         room = LARGEST - sum(map(len, parts.values())) - sum(len(text) for text in _statics())
         fields: list[_PageField] = []
         for index, name in enumerate(names):
             own = block if index == 0 else _block_of_field(surrogate, keys[name], block)
-            further = _page_field(surrogate.fields[keys[name]], own, model, index, surface)
+            further = _page_field(surrogate.fields[keys[name]], own, coarse.modes(index), surface)
             size = len(further.modes) + len(further.weights) * (index > 0)
             if index == 0 or size <= room - _MARGIN:
                 fields.append(further)
@@ -159,6 +165,7 @@ class _Page:
         facts = {
             "places": _places(model),
             "surface": surface.facts,
+            "drawn": drawn,
             "fields": [field.facts for field in fields],
         }
         parts |= {"hello": _packed(hello.to_json().encode()), "facts": _packed(json.dumps(facts).encode())}
@@ -225,12 +232,26 @@ def _block_of_field(surrogate: Surrogate, name: str, block: WeightsBlock) -> Wei
     return WeightsBlock({k: v for k, v in tables.items() if not SURFACE <= k < SURFACE + 3}, field=name)
 
 
-def _page_field(
-    shown: Any, block: WeightsBlock, model: PageModel, index: int, surface: PackedSurface
-) -> _PageField:
+def _drawn(
+    model: PageModel, carrier: PackedSurface, step: float
+) -> tuple[dict[str, Any] | None, dict[str, str]]:
+    """Return the facts and parts of the body's own surface and of its binding; none where the field's is drawn."""
+    drawing = model.drawing
+    own = drawing.fields[0].drawn if drawing.fields else None
+    if own is None:
+        return None, {}
+    surface = PackedSurface.of(drawing.surface, step)
+    facts, data = surface.binding(own, carrier, drawing.nodes)
+    return {"surface": surface.facts, "binding": facts}, {
+        "drawn": _packed(surface.data),
+        "binding": _packed(data),
+    }
+
+
+def _page_field(shown: Any, block: WeightsBlock, modes: Modes, surface: PackedSurface) -> _PageField:
     """Return a field of the page from the block with its modes."""
     scales, small = block.tables[FIELD + 3].values, block.tables[FIELD + 4].values
-    facts, data = surface.field(model.modes(index), scales)
+    facts, data = surface.field(modes, scales)
     rows = (small.reshape(len(scales), -1) * scales[:, None]).reshape(len(scales), *shown.rest.shape)
     points = rounded_points(shown.points, surface.facts["step"])
     rounded = replace(shown, rest=rows[0], modes=rows[1:], points=points)

@@ -67,7 +67,7 @@ __all__ = [
     "Vec3",
 ]
 
-PROTOCOL = 6  # a page of another protocol reloads itself
+PROTOCOL = 7  # a page of another protocol reloads itself
 
 Vec3 = tuple[float, float, float]
 
@@ -216,6 +216,7 @@ class Modes(Binary):
     rest: Annotated[np.ndarray, Wire("floats", "components of each point")]
     modes: Annotated[np.ndarray, Wire("floats", "the same of each mode")]
     touched: Annotated[np.ndarray, Wire("floats", "points that the local mode may move")]
+    shares: Annotated[np.ndarray, Wire("floats", "share of the local mode that each of them takes")]
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,11 +19,13 @@ from typing import Any
 
 import numpy as np
 
+from palpate.dataset.carried_surface import CarriedSurface
 from palpate.viewer.messages import Modes, Surface
 
 __all__ = ["PackedSurface", "rounded_points"]
 
 _DIRECTIONS = 1e-3  # step of a normal's components
+_WEIGHTS = 2**-11  # step of a barycentric coordinate: a hundredth of a millimetre on a side of 20
 
 
 @dataclass
@@ -59,6 +61,7 @@ class _Order:
     thirds: np.ndarray  # (t,), the third corner, counted back from the newest point
     starts: np.ndarray  # (3 s,), corners of the triangles without a gate, counted so
     parents: np.ndarray  # (n, 3), a, b and d of each point; −1 where none are known
+    corners: np.ndarray  # (t, 3), points of each triangle, as they come out of the file
 
 
 def _order_of(triangles: np.ndarray, count: int) -> _Order:
@@ -72,6 +75,7 @@ def _order_of(triangles: np.ndarray, count: int) -> _Order:
     thirds: list[int] = []
     starts: list[int] = []
     points: list[int] = []
+    corners: list[tuple[int, int, int]] = []
     seen = [False] * len(triangles)
 
     def code(corner: int) -> int:
@@ -90,6 +94,7 @@ def _order_of(triangles: np.ndarray, count: int) -> _Order:
         thirds.append(0)
         seen[first] = True
         order.append(first)
+        corners.append((places[a], places[b], places[c]))
         # triangle's place, edge of it, the edge's ends and the corner beside them
         stack = [(len(order) - 1, e, *ends) for e, ends in enumerate(((a, b, c), (b, c, a), (c, a, b)))]
         while stack:
@@ -103,10 +108,11 @@ def _order_of(triangles: np.ndarray, count: int) -> _Order:
             gates.append(3 * (len(order) - place) + edge)
             thirds.append(code(c))
             order.append(t)
+            corners.append((places[b], places[a], places[c]))
             stack += [(len(order) - 1, e, *ends) for e, ends in enumerate(((b, a, c), (a, c, b), (c, b, a)))]
     lists = (points, places, order, gates, thirds, starts)
     one, two, three, four, five, six = (np.array(numbers, dtype=np.int64) for numbers in lists)
-    return _Order(one, two, three, four, five, six, parents)
+    return _Order(one, two, three, four, five, six, parents, np.array(corners, dtype=np.int64))
 
 
 def _differences(values: np.ndarray, parents: np.ndarray) -> np.ndarray:
@@ -130,6 +136,7 @@ class PackedSurface:
 
     facts: dict[str, Any]
     data: bytes
+    triangles: np.ndarray  # (t, 3), in the order of before
     _order: _Order
 
     @classmethod
@@ -149,7 +156,7 @@ class PackedSurface:
         normals = np.asarray(surface.normals, dtype=np.float64).reshape(-1, 3)[sorting]
         lists.add(_deltas(np.rint(normals / _DIRECTIONS).astype(np.int64).T))
         facts = {"points": len(points), "step": step, "direction": _DIRECTIONS, "lists": lists.sizes}
-        return cls(facts, lists.data, order)
+        return cls(facts, lists.data, triangles, order)
 
     def field(self, modes: Modes, scales: np.ndarray) -> tuple[dict[str, Any], bytes]:
         """Return what the numbers of a field mean, and the numbers, from its modes at the surface's points.
@@ -164,6 +171,26 @@ class PackedSurface:
         lists.add(_deltas(np.sort(order.places[np.asarray(modes.touched, dtype=np.int64)])[None]))
         facts = {"reach": modes.reach, "rows": modes.rows, "scales": scales.tolist(), "lists": lists.sizes}
         return facts, lists.data
+
+    def binding(
+        self, carried: CarriedSurface, carrier: PackedSurface, nodes: np.ndarray
+    ) -> tuple[dict[str, Any], bytes]:
+        """Return what the numbers of a binding mean, and the numbers.
+
+        This surface is `carried`, whose vertex `nodes` (n,) each point stands for, and `carrier` the field's. Each
+        point is bound to four triangles of that by the one in their middle, whose corners halve the sides.
+        """
+        lists, own, other = _Lists(), nodes[self._order.points], carrier._order
+        place = np.argsort(other.triangles)
+        middles = place.reshape(-1, 4)[:, 3]  # of each four, in the order of the file
+        lists.add(_deltas(middles[carried.cells[own]][None]))
+        # the corners of a triangle may begin elsewhere in the file
+        first = other.places[np.asarray(carrier.triangles)[3::4][carried.cells[own], 0]]
+        turn = np.argmax(other.corners[middles[carried.cells[own]]] == first[:, None], axis=1)
+        weights = np.rint(carried.weights[own] / _WEIGHTS).astype(np.int64)
+        columns = (np.arange(2) - turn[:, None]) % 3
+        lists.add(_deltas(np.take_along_axis(weights, columns, axis=1).T))
+        return {"weight": _WEIGHTS, "lists": lists.sizes}, lists.data
 
 
 def _deltas(rows: np.ndarray) -> np.ndarray:

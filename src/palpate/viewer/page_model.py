@@ -75,19 +75,23 @@ class PageModel:
         self.surface: Surface | None = getattr(self._drawing, "surface", None)
 
     @property
+    def drawing(self) -> SurfaceDrawing:
+        """The drawing of a body with a surface."""
+        assert isinstance(self._drawing, SurfaceDrawing)
+        return self._drawing
+
+    @property
     def field_count(self) -> int:
         """Number of the fields on the surface."""
         return len(self._drawing.infos)
 
     def modes(self, index: int) -> Modes:
         """Return what the page needs to sum up field `index` of the surface."""
-        assert isinstance(self._drawing, SurfaceDrawing)
-        return self._drawing.modes(index)
+        return self.drawing.modes(index)
 
     def trust_map(self) -> TrustMap:
         """Return how well the force is known over the touched surface."""
-        assert isinstance(self._drawing, SurfaceDrawing)
-        return trust_map(self._drawing)
+        return trust_map(self.drawing)
 
     def hello(
         self, state: HandSettings, rate: float, hand: HandKind = HandKind.PAGE, device: str = ""

@@ -33,10 +33,12 @@ class SurfaceDrawing:
 
     `surface` is at rest; `nodes` (p,) int are the field's nodes that its points stand for. All `fields` shown are on
     the nodes of the first, which is the displacement where there is one; `infos` are their names, units and ranges.
+    Where the first field carries the body's own surface, that is drawn, and `nodes` are its vertices; without `detail`
+    the field's own triangles are drawn.
     """
 
-    def __init__(self, body: Touchable) -> None:
-        self.body = body
+    def __init__(self, body: Touchable, *, detail: bool = True) -> None:
+        self.body, self._detail = body, detail
         self.fields = _shown(body.fields)
         self.surface, self.nodes, self._indentation = self._at_rest()
         self._evaluators = [field.evaluator() for field in self.fields]
@@ -47,8 +49,9 @@ class SurfaceDrawing:
 
     def _at_rest(self) -> tuple[Surface, np.ndarray, IndentationDrawing | None]:
         if self.fields:
-            points, triangles = self.fields[0].points, self.fields[0].triangles
-            mark = touchable_triangles(self.body, self.fields[0])
+            first = self.fields[0]
+            points, triangles = first.pictured if self._detail else (first.points, first.triangles)
+            mark = touchable_triangles(self.body, first, detail=self._detail)
         else:
             points, triangles = relief(self.body)
             mark = np.ones(len(triangles), bool)
@@ -73,12 +76,17 @@ class SurfaceDrawing:
     def modes(self, index: int) -> Modes:
         """Return what the page needs to sum up field `index`."""
         field, nodes = self.fields[index], self.nodes
+        carry = field.at_pictured if self._detail else np.asarray
+        # where it begins, a vertex takes as much of the local mode as the nodes that carry it
+        shares = carry(field.touched[:, None].astype(float))[nodes, 0]
+        touched = np.flatnonzero(shares)
         return Modes(
             reach=0.0 if field.local_mode is None else field.local_mode.reach,
             rows=0 if field.local_mode is None else field.local_mode.table.shape[1],
-            rest=field.rest[nodes].ravel(),
-            modes=field.modes[:, nodes].ravel(),
-            touched=np.flatnonzero(field.touched[nodes]),
+            rest=carry(field.rest)[nodes].ravel(),
+            modes=carry(field.modes)[:, nodes].ravel(),
+            touched=touched,
+            shares=shares[touched],
         )
 
     def frame(self, state: State, held: bool, parameters: np.ndarray) -> dict[str, Any]:
@@ -159,4 +167,9 @@ def _shown(fields: Mapping[str, FieldSurrogate | NodeField]) -> tuple[FieldSurro
     moves = [field for field in on_surface if field.rest.shape[1] == 3 and field.unit == "m"]
     ordered = [*moves[:1], *(field for field in on_surface if field not in moves[:1])]
     first = ordered[0].points if ordered else np.zeros((0, 3))
-    return tuple(field for field in ordered if np.array_equal(field.points, first))
+    drawn = ordered[0].drawn if ordered else None
+    return tuple(
+        field
+        for field in ordered
+        if np.array_equal(field.points, first) and (drawn is None or field.drawn is not None)
+    )

@@ -91,21 +91,29 @@ def _components(count: int, pairs: np.ndarray) -> np.ndarray:
         label = after
 
 
-def touchable_triangles(body: Touchable, field: FieldSurrogate) -> np.ndarray:
-    """Return for each triangle (t,) of a field's surface whether it belongs to the touched surface."""
+def touchable_triangles(body: Touchable, field: FieldSurrogate, *, detail: bool = False) -> np.ndarray:
+    """Return for each triangle (t,) of a field's surface whether it belongs to the touched surface.
+
+    With `detail` the triangles are those that pictures show. These may lie beside the touched surface, which is that
+    of the elements: there the triangles count to which they are bound.
+    """
     corners = field.points[field.triangles]
+    distance, along = _beside(body, corners)
+    mark = (np.abs(distance) < NEAR * body.radius) & along
     if field.local_mode is not None:
-        return np.asarray(field.touched[field.triangles].all(axis=1) & _near(body, corners))
-    return _near(body, corners)
+        mark &= field.touched[field.triangles].all(axis=1)
+    if detail and field.drawn is not None:
+        points, triangles = field.pictured
+        mark = field.drawn.marked(mark) & _beside(body, points[triangles])[1]
+    return np.asarray(mark)
 
 
-def _near(body: Touchable, corners: np.ndarray) -> np.ndarray:
-    """Return whether triangles (t, 3, 3) lie on the touched surface and look the way it does."""
+def _beside(body: Touchable, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distances (t,) of triangles (t, 3, 3) to the touched surface, m, and whether they look its way."""
     assert body.surface is not None
     distance, slope, _ = body.surface.at(corners.mean(axis=1))
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    along = np.einsum("ti,ti->t", normal, slope) > 0.5 * np.linalg.norm(normal, axis=1)
-    return np.asarray((np.abs(distance) < NEAR * body.radius) & along)
+    return distance, np.einsum("ti,ti->t", normal, slope) > 0.5 * np.linalg.norm(normal, axis=1)
 
 
 def relief(body: Touchable) -> tuple[np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from palpate import checks
 from palpate.dataset import Dataset
+from palpate.dataset.carried_surface import CarriedSurface
 from palpate.errors import UsageError
 from palpate.learning.fields.decompose_field import Decomposition, best_decomposition, lumped_mass
 from palpate.learning.fields.field_search import layer_at_solves, search_coefficients
@@ -22,7 +23,6 @@ from palpate.options import FieldOptions, takes
 from palpate.rbf.freezing import freeze_refined, training_record
 from palpate.rbf.sample_checks import numbers
 from palpate.surrogates import FieldSurrogate, TouchedSurface
-from palpate.surrogates.fields import CarriedSurface
 from palpate.surrogates.fields.depth_amplitude import AMPLITUDES
 from palpate.units import Quantity, Range, bounds
 

@@ -3,7 +3,6 @@
 ::
 
     field_surrogate        FieldSurrogate, the whole of it, and its errors
-    carried_surface        the body's own surface at full detail, bound to the nodes of a field
     depth_amplitude        how a field grows with depth
     node_field             NodeField, at the nodes of a body that loads bend
     local_mode             the part that moves with the probe, and its variation from place to place
@@ -12,7 +11,6 @@
     surface_interpolation  from the nodes of one mesh of a surface to those of another
 """
 
-from palpate.surrogates.fields.carried_surface import CarriedSurface, quadratic_triangles, quartered
 from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
 from palpate.surrogates.fields.field_evaluator import FieldEvaluator
 from palpate.surrogates.fields.field_surrogate import FieldErrors, FieldSurrogate
@@ -20,7 +18,6 @@ from palpate.surrogates.fields.local_mode import LocalMode, Variation
 from palpate.surrogates.fields.node_field import NodeEvaluator, NodeField
 
 __all__ = [
-    "CarriedSurface",
     "DepthAmplitude",
     "FieldErrors",
     "FieldEvaluator",
@@ -29,6 +26,4 @@ __all__ = [
     "NodeEvaluator",
     "NodeField",
     "Variation",
-    "quadratic_triangles",
-    "quartered",
 ]

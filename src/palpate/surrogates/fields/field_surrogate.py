@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from palpate.checks import own_arrays
+from palpate.dataset.carried_surface import CarriedSurface
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.network import Network
 from palpate.network.network_kernels import Precision
 from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.continuation import Continuation
-from palpate.surrogates.fields.carried_surface import CarriedSurface
 from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
 from palpate.surrogates.fields.field_evaluator import FieldEvaluator
 from palpate.surrogates.fields.field_kernels import moving_values, profile_arguments
@@ -245,6 +245,16 @@ class FieldSurrogate:
                 return "it has another touched surface"
         names = [(r.name, r.unit) for r in self.inputs]
         return "" if names == [(r.name, r.unit) for r in energy.inputs] else "it has other inputs"
+
+    @property
+    def pictured(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points (p, 3) in m and triangles (t, 3) that pictures show: the body's own surface, where it is known."""
+        own: FieldSurrogate | CarriedSurface = self.drawn or self
+        return own.points, own.triangles
+
+    def at_pictured(self, values: np.ndarray) -> np.ndarray:
+        """Return values (..., p, c) at the points that pictures show, from those (..., nodes, c) at the nodes."""
+        return values if self.drawn is None else self.drawn.carry(values, self.triangles)
 
     @cached_property
     def touched(self) -> np.ndarray:

@@ -83,7 +83,7 @@ export class Field {
   private local(profile: Float32Array, contact: Vec3): void {
     if (!profile.some((x) => x !== 0)) return;
     const { values, points } = this;
-    const { reach, rows } = this.modes;
+    const { reach, rows, shares } = this.modes;
     const per = this.info.components;
     const [cx, cy, cz] = contact;
     const { touched } = this;
@@ -93,6 +93,7 @@ export class Field {
     // this runs for thousands of points a picture: nothing is allocated in it
     for (let k = 0; k < touched.length; k++) {
       const i = touched[k]!;
+      const share = shares[k]!;
       const x = (points[3 * i]! - cx) / reach;
       const y = (points[3 * i + 1]! - cy) / reach;
       const z = (points[3 * i + 2]! - cz) / reach;
@@ -108,7 +109,7 @@ export class Field {
           const along = profile[at]! + x * profile[at + per]! + y * profile[at + 2 * per]! + z * profile[at + 3 * per]!;
           sum += w[j]! * along;
         }
-        values[per * i + c]! += sum;
+        values[per * i + c]! += share * sum;
       }
     }
   }

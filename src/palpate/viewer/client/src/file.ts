@@ -8,14 +8,15 @@ import { FileConnection } from "./file_connection";
 import { IndentationDrawing } from "./indentation_drawing";
 import type { Places } from "./indentation_drawing";
 import type { Hello } from "./messages";
-import { PackedSurface } from "./packed";
-import type { FieldFacts, SurfaceFacts } from "./packed";
+import { Binding, PackedSurface } from "./packed";
+import type { BindingFacts, FieldFacts, SurfaceFacts } from "./packed";
 import { provide } from "./resources";
 import { touch } from "./touch";
 
 interface Facts {
   places: Places | null; // where indentations stay
   surface: SurfaceFacts;
+  drawn: { surface: SurfaceFacts; binding: BindingFacts } | null; // the body's own surface, which the other carries
   fields: FieldFacts[];
 }
 
@@ -57,17 +58,23 @@ async function open(): Promise<void> {
     each("field", facts.fields.length),
   ]);
   const packed = new PackedSurface(facts.surface, mesh);
-  const fields = facts.fields.map((own, i) => packed.field(own, modes[i]!));
-  provide({ surface: async () => packed.surface, modes: async (field) => fields[field]! });
+  let fields = facts.fields.map((own, i) => packed.field(own, modes[i]!));
+  let { surface } = packed;
+  if (facts.drawn) {
+    const binding = new Binding(facts.drawn.binding, await part("binding"), surface);
+    fields = fields.map((field, i) => binding.carry(field, hello.fields[i]!.components));
+    ({ surface } = new PackedSurface(facts.drawn.surface, await part("drawn")));
+  }
+  provide({ surface: async () => surface, modes: async (field) => fields[field]! });
   const evaluator = await Evaluator.of(module, blocks.map(words), facts.places?.points.length);
-  const kept = facts.places && new IndentationDrawing(evaluator, hello, packed.surface, facts.places);
+  const kept = facts.places && new IndentationDrawing(evaluator, hello, surface, facts.places);
   const curve = new DepthCurve(hello, evaluator);
   touch({
     connect: (listener) => new FileConnection(listener, hello, evaluator, kept),
     seen: (frame) => curve.update(frame),
   });
   // for programs that drive the page, and for whoever wants to ask the body
-  Object.assign(window, { palpate: { hello, evaluator, surface: packed.surface, fields, kept } });
+  Object.assign(window, { palpate: { hello, evaluator, surface, fields, kept } });
 }
 
 document.documentElement.dataset["file"] = "";

@@ -6,7 +6,7 @@ import type { Layout } from "./wire";
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 6;
+export const PROTOCOL = 7;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -487,6 +487,8 @@ export interface Modes {
   modes: Float32Array;
   /** points that the local mode may move */
   touched: Float32Array;
+  /** share of the local mode that each of them takes */
+  shares: Float32Array;
 }
 
 const MODES_LAYOUT: Layout = [
@@ -495,6 +497,7 @@ const MODES_LAYOUT: Layout = [
   ["rest", "floats"],
   ["modes", "floats"],
   ["touched", "floats"],
+  ["shares", "floats"],
 ];
 
 export const encodeModes = (m: Modes): ArrayBuffer => encode(MODES, MODES_LAYOUT, m);

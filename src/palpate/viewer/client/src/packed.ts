@@ -56,7 +56,71 @@ export class PackedSurface {
     fill(rest, list(), scales[0]!, this.parents);
     const modes = new Float32Array(count * size);
     for (let k = 0; k < count; k++) fill(modes.subarray(k * size, (k + 1) * size), list(), scales[k + 1]!, this.parents);
-    return { reach, rows, rest, modes, touched: interleave(list(), 1, 1) };
+    const touched = interleave(list(), 1, 1);
+    return { reach, rows, rest, modes, touched, shares: new Float32Array(touched.length).fill(1) };
+  }
+}
+
+/** What the numbers of a binding mean. */
+export interface BindingFacts {
+  weight: number; // step of a barycentric coordinate
+  lists: Sizes;
+}
+
+/** How a surface of its own is carried by a field's: by the corners and the middles of the sides of triangles in four parts. */
+export class Binding {
+  private readonly nodes: Int32Array; // six of each point
+  private readonly shares: Float32Array;
+
+  constructor({ weight, lists }: BindingFacts, bytes: Uint8Array, { triangles, rest }: Surface) {
+    const list = reader(lists, bytes);
+    const [middles, weights] = [interleave(list(), 1, 1), interleave(list(), 2, weight)];
+    const points = rest.length / 3;
+    const third = new Map<number, number>(); // beside each edge, as its triangle runs along it
+    const edge = (a: number, b: number): number => a * points + b;
+    for (let t = 0; t < triangles.length; t += 3) {
+      for (let k = 0; k < 3; k++) third.set(edge(triangles[t + k]!, triangles[t + ((k + 1) % 3)]!), triangles[t + ((k + 2) % 3)]!);
+    }
+    this.nodes = new Int32Array(6 * middles.length);
+    this.shares = new Float32Array(6 * middles.length);
+    for (let i = 0; i < middles.length; i++) {
+      const [u, v] = [weights[2 * i]!, weights[2 * i + 1]!];
+      const w = [u, v, 1 - u - v];
+      for (let k = 0; k < 3; k++) {
+        const [before, middle] = [(k + 2) % 3, triangles[3 * middles[i]! + k]!];
+        // the corner between the middles of two sides lies across the edge between these
+        this.nodes[6 * i + k] = third.get(edge(middle, triangles[3 * middles[i]! + before]!))!;
+        this.nodes[6 * i + 3 + k] = middle;
+        this.shares[6 * i + k] = w[k]! * (2 * w[k]! - 1);
+        this.shares[6 * i + 3 + k] = 4 * w[k]! * w[(k + 1) % 3]!;
+      }
+    }
+  }
+
+  /** A field's modes at the points that are carried, from those on the field's surface. */
+  carry(modes: Modes, per: number): Modes {
+    const count = modes.modes.length / (modes.rest.length || 1);
+    const [from, to] = [modes.rest.length, (per * this.nodes.length) / 6];
+    const out = new Float32Array(count * to);
+    for (let k = 0; k < count; k++) this.values(out.subarray(k * to, (k + 1) * to), modes.modes.subarray(k * from, (k + 1) * from), per);
+    const all = new Float32Array(from / per);
+    modes.touched.forEach((i) => (all[i] = 1));
+    const shares = this.values(new Float32Array(to / per), all, 1);
+    const touched = Float32Array.from(shares.keys()).filter((i) => shares[i] !== 0);
+    const rest = this.values(new Float32Array(to), modes.rest, per);
+    return { ...modes, rest, modes: out, touched, shares: shares.filter((share) => share !== 0) };
+  }
+
+  private values(out: Float32Array, values: Float32Array, per: number): Float32Array {
+    const { nodes, shares } = this;
+    for (let i = 0, at = 0; at < nodes.length; i++, at += 6) {
+      for (let c = 0; c < per; c++) {
+        let sum = 0;
+        for (let k = at; k < at + 6; k++) sum += shares[k]! * values[per * nodes[k]! + c]!;
+        out[per * i + c] = sum;
+      }
+    }
+    return out;
   }
 }
 

@@ -6,6 +6,7 @@ import {
   BufferGeometry,
   Color,
   DoubleSide,
+  FrontSide,
   Float32BufferAttribute,
   InstancedMesh,
   LessDepth,
@@ -36,6 +37,7 @@ const STANCE = {
 };
 
 const UNKNOWN = -0.5; // a share below it means that nothing is known there
+const OPEN = 1e-4; // sum of a surface's area vectors over its area, from which on it has a border
 const DOT = 0.006; // of the body's size, radius of a dot
 
 export interface Layers {
@@ -92,7 +94,7 @@ export class SurfaceView extends View {
     normalsInto(this.facing.array as Float32Array, rest, this.triangles);
     this.body = new Mesh(
       this.geometry,
-      new MeshPhongMaterial({ vertexColors: true, side: DoubleSide, shininess: 24, specular: 0x1c1c1c }),
+      new MeshPhongMaterial({ vertexColors: true, side: closed(rest, this.triangles) ? FrontSide : DoubleSide, shininess: 24, specular: 0x1c1c1c }),
     );
     outlined(this.body.material);
     // pulled a little towards the camera, so that the lines on the surface are not half lost in it
@@ -284,6 +286,20 @@ export class SurfaceView extends View {
     const near = 1e-3 * this.across();
     return fixed.length > 0 && Array.from(fixed).every((i) => rest[3 * i + 2]! - this.low.z < near);
   }
+}
+
+/** True for a surface without a border; its inside, which nobody sees, would otherwise shine through in dark dots at its outline. */
+function closed(points: ArrayLike<number>, triangles: Uint32Array): boolean {
+  const sum = new Vector3();
+  let all = 0;
+  const corner = (i: number): Vector3 => new Vector3(points[3 * i]!, points[3 * i + 1]!, points[3 * i + 2]!);
+  for (let t = 0; t < triangles.length; t += 3) {
+    const [a, b, c] = [0, 1, 2].map((k) => corner(triangles[t + k]!)) as [Vector3, Vector3, Vector3];
+    const area = b.sub(a).cross(c.sub(a));
+    sum.add(area);
+    all += area.length();
+  }
+  return sum.length() < OPEN * all; // areas of a closed surface add up to nothing
 }
 
 /** Colours as red, green, blue, one after the other. */

@@ -13,15 +13,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from palpate.checks import own_arrays
-from palpate.surrogates.fields.surface_interpolation import node_normals
 
-__all__ = ["CarriedSurface", "quadratic_triangles", "quartered"]
+if TYPE_CHECKING:
+    from palpate.dataset.dataset import Dataset
+
+__all__ = [
+    "CarriedSurface",
+    "has_middles",
+    "quadratic_triangles",
+    "quartered",
+    "surface_nodes",
+    "surface_values",
+]
 
 SIDES = ((0, 1), (1, 2), (2, 0))
 QUARTERS = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))  # of a triangle of six nodes
@@ -76,7 +84,9 @@ class CarriedSurface:
         cls, points: np.ndarray, triangles: np.ndarray, nodes: np.ndarray, cells: np.ndarray
     ) -> CarriedSurface:
         """Bind vertices (p, 3) of triangles (t, 3) to triangles (c, 6) of nodes (n, 3) at rest; lengths in m."""
-        corners, facing = nodes[cells[:, :3]], node_normals(points, triangles)
+        from scipy.spatial import cKDTree
+
+        corners, facing = nodes[cells[:, :3]], _normals(points, triangles)
         grid = _grid()
         tree, steps = cKDTree(np.einsum("gk,cki->cgi", grid, corners).reshape(-1, 3)), len(grid)
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -133,9 +143,48 @@ class CarriedSurface:
         return out
 
     def marked(self, mark: np.ndarray) -> np.ndarray:
-        """Return for each triangle (t,) of it whether a mark (4 c,) of a field's triangles is at most corners."""
+        """Return for each triangle (t,) whether a corner is bound where a mark (4 c,) of a field's triangles is."""
         bound = np.asarray(mark, dtype=bool).reshape(-1, 4).any(axis=1)[self.cells]
-        return np.asarray(bound[self.triangles].sum(axis=1) >= 2)
+        return np.asarray(bound[self.triangles].any(axis=1))
+
+
+def has_middles(data: Dataset) -> bool:
+    """Return whether all rows have what carries the body's own surface; those of earlier versions have not."""
+    known = "mid_displacement" in data and "drawn_points" in data
+    return known and bool(np.isfinite(data["mid_displacement"]).all())
+
+
+def surface_nodes(rest: np.ndarray, triangles: np.ndarray, middles: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the surface's nodes (n, 3) at rest, m, and its triangles (t, 3), or (t, 6) with middles of edges."""
+    nodes, own = np.unique(triangles, return_inverse=True)
+    points, own = rest[nodes], own.reshape(-1, 3)
+    if not middles:
+        return points, own
+    edges, cells = quadratic_triangles(own, len(points))
+    return np.concatenate([points, points[edges].mean(axis=1)]), cells
+
+
+def surface_values(data: Dataset, name: str, middles: bool) -> np.ndarray:
+    """Return a field (N, n, components) of all solves at the `surface_nodes`.
+
+    A stress is averaged over the elements around a node, and has no more detail in the middle of an edge.
+    """
+    values = np.asarray(data[name]).reshape(len(data), len(data.rest), -1)
+    at_nodes = values[:, np.unique(data.triangles)]
+    if not middles:
+        return at_nodes
+    edges, _ = quadratic_triangles(data.triangles, 0)
+    further = data["mid_displacement"] if name == "displacement" else values[:, edges].mean(axis=2)
+    return np.concatenate([at_nodes, further], axis=1)
+
+
+def _normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the sums (p, 3) of the area vectors of the triangles around each vertex, of any length."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    normals = np.zeros_like(points)
+    for corner in triangles.T:
+        np.add.at(normals, corner, np.cross(b - a, c - a))
+    return normals
 
 
 def _grid() -> np.ndarray:

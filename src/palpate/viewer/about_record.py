@@ -1,4 +1,4 @@
-"""What a page says about its body: the record of its making without empty fields and without internal names."""
+"""The record of a body's making as a page shows it, without empty fields and without internal names."""
 
 from __future__ import annotations
 

@@ -156,7 +156,7 @@ def _solved_by_load(chapter: Chapter) -> str:
     failed = len(train) + len(test) - len(train.ok) - len(test.ok)
     text = (
         f"{body_words(train.provenance)} was solved by finite elements under loads {loads}: "
-        f"{len(train.ok)} solves to learn from and {len(test.ok)} that the networks never saw."
+        f"{len(train.ok)} solves to learn from and {chapter.validation.samples} that the networks never saw."
     )
     if failed:
         text += f" {count(failed, 'solve')} did not converge and were left out."

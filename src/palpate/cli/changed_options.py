@@ -73,9 +73,11 @@ def _flag(name: str) -> str:
 
 def _words(name: str, value: Any) -> str:
     """Return the value of an option in words, with its unit."""
-    write = {"m": millimetres, "Pa": pressure}.get(declarations(PartOptions)[name].unit)
-    if write is not None:
-        return write(value)
+    unit = declarations(PartOptions)[name].unit
+    if unit == "m":
+        return millimetres(value)
+    if unit == "Pa":
+        return pressure(value)
     return ", ".join(value) if isinstance(value, tuple) else str(value)
 
 

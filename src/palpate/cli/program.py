@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import signal
 import sys
+from pathlib import Path
 
 import typer
 
+from palpate.checks import did_you_mean
 from palpate.cli.app import app
 from palpate.cli.console import Console, advice_in_words
 from palpate.errors import AccuracyError, PalpateError
 from palpate.files import explain_system_error
 from palpate.processes import end_by_sigterm, interrupts, note_interrupt
 
-__all__ = ["KEPT", "kept_after", "main"]
+__all__ = ["KEPT", "kept_after", "main", "near_file"]
 
 INTERRUPTED = 128 + signal.SIGINT  # the shell's code of a program that Ctrl-C has ended
 TERMINATED = 128 + signal.SIGTERM  # and of one that was asked to end
+
+_ALIKE = 0.75  # how alike the name of a file must be to be offered in place of one that is not there
 
 _GOES_ON = "What is solved is kept: the same command goes on."
 _AS_BEFORE = "Nothing was changed."
@@ -62,6 +66,20 @@ def kept_after(words: list[str]) -> str:
     return next((KEPT[name] for name in names if name in KEPT), "")
 
 
+def near_file(words: list[str], what: str) -> str:
+    """Return a question that offers the file whose name is near, where an error is of a file that is not there."""
+    missing = [
+        Path(word)
+        for word in words
+        if not word.startswith("-") and word in what and Path(word).suffix and not Path(word).exists()
+    ]
+    if not missing or not missing[0].parent.is_dir():
+        return ""
+    path = missing[0]
+    beside = [file.name for file in path.parent.iterdir()]
+    return did_you_mean(path.name, beside, shown=lambda name: str(path.with_name(name)), cutoff=_ALIKE)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; an error that palpate foresaw ends with its exit code and without a traceback."""
     words = sys.argv[1:] if arguments is None else arguments
@@ -78,7 +96,9 @@ def main(arguments: list[str] | None = None) -> None:
         Console().error(error)  # the figures have been printed already, as JSON where asked
         sys.exit(error.exit_code)
     except PalpateError as error:
-        Console(as_json="--json" in words).error(error)
+        near = near_file(words, error.what)
+        known = type(error)(error.what, why=error.why, fix=" ".join(filter(None, (near, error.fix))))
+        Console(as_json="--json" in words).error(known)
         sys.exit(error.exit_code)
     except (OSError, MemoryError) as error:  # 1, which Python would end with, says that a target was missed
         known = explain_system_error(f"palpate {words[0] if words else ''} could not go on.", error)

@@ -144,7 +144,8 @@ class CarriedSurface:
 
     def marked(self, mark: np.ndarray) -> np.ndarray:
         """Return for each triangle (t,) whether a corner is bound where a mark (4 c,) of a field's triangles is."""
-        bound = np.asarray(mark, dtype=bool).reshape(-1, 4).any(axis=1)[self.cells]
+        marked = np.asarray(np.asarray(mark, dtype=bool).reshape(-1, 4).any(axis=1))
+        bound = marked[self.cells]
         return np.asarray(bound[self.triangles].any(axis=1))
 
 

@@ -203,8 +203,19 @@ def _carry_out(
 
 
 def _figures(step: Any) -> dict[str, Any]:
-    names = ("phase", "solves", "unseen", "error", "median", "seconds", "is_new", "reached", "reason")
-    names += ("before", "tried")
+    names = (
+        "phase",
+        "solves",
+        "unseen",
+        "error",
+        "median",
+        "seconds",
+        "is_new",
+        "reached",
+        "reason",
+        "before",
+        "tried",
+    )
     return {name: getattr(step, name) for name in names} | {"places": step.places.tolist()}
 
 

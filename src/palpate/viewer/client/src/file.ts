@@ -6,6 +6,8 @@ import { Evaluator } from "./evaluator";
 import { say } from "./flags";
 import { FileConnection } from "./file_connection";
 import { IndentationDrawing } from "./indentation_drawing";
+import { LineShape } from "./line_shape";
+import type { LineFacts } from "./line_shape";
 import type { Places } from "./indentation_drawing";
 import type { Hello } from "./messages";
 import { PackedSurface } from "./packed";
@@ -15,8 +17,9 @@ import { touch } from "./touch";
 
 interface Facts {
   places: Places | null; // where indentations stay
-  surface: SurfaceFacts;
+  surface: SurfaceFacts | null; // none of a body drawn as a line
   fields: FieldFacts[];
+  line: LineFacts | null;
 }
 
 /** Bytes from base64. */
@@ -50,24 +53,26 @@ async function open(): Promise<void> {
   const [hello, facts] = await Promise.all([json<Hello>("hello"), json<Facts>("facts")]);
   const each = (name: string, count: number): Promise<Uint8Array<ArrayBuffer>[]> =>
     Promise.all(Array.from({ length: count }, (_, i) => part(`${name}-${i}`)));
-  const [mesh, module, blocks, modes] = await Promise.all([
-    part("surface"),
+  const [mesh, nodes, module, blocks, modes] = await Promise.all([
+    facts.surface ? part("surface") : null,
+    facts.line ? part("line") : null,
     part("core"),
     each("weights", Math.max(1, facts.fields.length)),
     each("field", facts.fields.length),
   ]);
-  const packed = new PackedSurface(facts.surface, mesh);
-  const fields = facts.fields.map((own, i) => packed.field(own, modes[i]!));
-  provide({ surface: async () => packed.surface, modes: async (field) => fields[field]! });
-  const evaluator = await Evaluator.of(module, blocks.map(words), facts.places?.points.length);
-  const kept = facts.places && new IndentationDrawing(evaluator, hello, packed.surface, facts.places);
+  const packed = facts.surface && new PackedSurface(facts.surface, mesh!);
+  const fields = facts.fields.map((own, i) => packed!.field(own, modes[i]!));
+  provide({ surface: async () => packed!.surface, modes: async (field) => fields[field]! });
+  const evaluator = await Evaluator.of(module, blocks.map(words), facts.places?.points.length, nodes && words(nodes));
+  const kept = facts.places && new IndentationDrawing(evaluator, hello, packed!.surface, facts.places);
+  const line = facts.line && new LineShape(evaluator, facts.line, hello.line!.rest.length);
   const curve = new DepthCurve(hello, evaluator);
   touch({
-    connect: (listener) => new FileConnection(listener, hello, evaluator, kept),
+    connect: (listener) => new FileConnection(listener, hello, evaluator, kept, line),
     seen: (frame) => curve.update(frame),
   });
   // for programs that drive the page, and for whoever wants to ask the body
-  Object.assign(window, { palpate: { hello, evaluator, surface: packed.surface, fields, kept } });
+  Object.assign(window, { palpate: { hello, evaluator, surface: packed?.surface, fields, kept, line } });
 }
 
 document.documentElement.dataset["file"] = "";

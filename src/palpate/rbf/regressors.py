@@ -90,12 +90,13 @@ class Regressors:
     def _centred_at(self, x: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The same at one point x (n,) of units with centres, compiled: the sequential filter asks nothing as often."""
         form, h = self.form, len(theta)
+        assert isinstance(form, Centred)
         v, by_v, out = np.empty((h, form.inputs)), np.empty((h, form.inputs)), np.empty((1, h, form.size))
         widths = form.widths(theta)
         _centred_distances(x, theta, widths, form.rows, form.columns, v)
         g, g1, _ = radial(self.radial, (v * v).sum(axis=1))
         np.multiply(2.0 * g1[:, None], v, out=by_v)
-        log = form.log  # type: ignore[attr-defined]
+        log = form.log
         _centred_slopes(x, theta, widths, form.rows, form.columns, by_v, log, out[0])
         return g[None], out
 

@@ -174,7 +174,12 @@ class _Page:
         block = WeightsBlock.of(surrogate)
         card = card_of(surrogate).with_hash(f"{block.label}, of a page", block.hash)
         nodes = WeightsBlock.of_network(line.network)
-        facts = {"places": None, "surface": None, "fields": [], "line": line_facts(line, surrogate)}
+        facts: dict[str, Any] = {
+            "places": None,
+            "surface": None,
+            "fields": [],
+            "line": line_facts(line, surrogate),
+        }
         hello = replace(hello, meta=card.in_words())
         parts = {
             "core": _packed(built_core("core.wasm")),

@@ -54,18 +54,14 @@ __all__ = ["fit"]
 _error = attrgetter("error")  # of a candidate, on held-out samples
 _WORK = 5e11  # multiplications at effort 1: half a minute at most
 _PLANNED_SECONDS = 30.0  # of that work: a shorter limit on time plans for less
-_FULL_NUMBERS, _LOOK_NUMBERS = (
-    1500,
-    600,
-)  # unknowns in the units of a candidate at effort 1, and at a first look
+# unknowns in the units of a candidate at effort 1, and at a first look
+_FULL_NUMBERS, _LOOK_NUMBERS = 1500, 600
 _METRIC_SAMPLES = 500  # of which a likelihood is computed; its work goes with their cube
 _CROSSED_FOLDS, _CROSSED_ROUNDS = 5, 2  # of the networks learnt crosswise: ten in all
 _QUICK = 0.03  # effort below which one round of folds judges one kind: a first answer in about a second
 _CROSSED_SHARE = 0.5  # of all work, for the networks learnt crosswise
 _CROSSED_PLACES = 60  # of fewer places no network was ever ahead of a Gaussian process
-_LAYER_FOLDS = (
-    10  # of a kernel layer: the final one learns from all samples, and fewer folds would say too much
-)
+_LAYER_FOLDS = 10  # of a kernel layer, whose final one learns from all samples: fewer would say too much
 _LAYER_STEPS = 15  # of the likelihood without a fold, from the metric of all samples
 _CLOSE_TO_LAYER = 1.3  # times the kernel layer's error: a mean of ten networks may still miss less
 _HOPELESS = 3.0  # times the kernel layer's error after the first stages: no refinement makes up for that
@@ -144,14 +140,8 @@ def fit(
             fitted = better_with_copies(fitted, samples, some, options)
         few = len(places) <= MANY_ROWS and few_places(places)
         fitted = replace(fitted, seconds=time.monotonic() - began)
-        words = outlook(
-            len(some.X),
-            fitted,
-            options.effort,
-            noise=chooser.noise(),
-            few=few,
-            enough=options.target or 0.0,
-        )
+        enough = options.target or 0.0
+        words = outlook(len(some.X), fitted, options.effort, noise=chooser.noise(), few=few, enough=enough)
     fitted = replace(fitted, columns=samples.columns, outlook=words)
     for note in fitted.notes:
         if not note.startswith(IDLE):
@@ -250,8 +240,7 @@ class _Chooser:
         """Return the noise that the likelihood of a process sees in the samples, relative to the outputs' spread."""
         if self.metric is None:
             return 0.0
-        X, Y = self.X[:_METRIC_SAMPLES], self.Y[:_METRIC_SAMPLES]
-        return self.metric.noise(X, Y) / self.problem.unit
+        return self.metric.noise(self.X[:_METRIC_SAMPLES], self.Y[:_METRIC_SAMPLES]) / self.problem.unit
 
     def _winner(self, mark: float) -> Candidate:
         """Return the best form, radial function and size, refined where the kernel layer is not far ahead."""

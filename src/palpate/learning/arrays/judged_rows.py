@@ -61,4 +61,4 @@ def measured(Y: Any, rows: int, outputs: int) -> np.ndarray:
             f"Outputs of shape {Y.shape} do not fit {rows} rows of inputs and a network of {outputs} outputs.",
             fix="Pass Y with a row for each row of X, and a column for each output.",
         )
-    return Y
+    return np.asarray(Y)

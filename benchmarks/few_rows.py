@@ -123,7 +123,7 @@ def _measured(case: Standard, count: int, seed: int) -> tuple[float, float, floa
     asked, truth = case.asked(ASKED)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FitWarning)
-        model = pp.fit(X, y, seed=seed)
+        model = pp.fit(X, y, effort=1.0, seed=seed)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         theirs, deviation = gaussian_process(X, y).with_deviation(asked)

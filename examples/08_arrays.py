@@ -23,7 +23,7 @@ low, high = [0.1, 0.1], [2.0, 0.6]
 X = rng.uniform(low, high, (400, 2))
 Y = measured(X, rng)
 
-model = pp.fit(X, Y, effort=0.2)
+model = pp.fit(X, Y)
 print(model)
 
 X_new = rng.uniform(low, high, (2000, 2))

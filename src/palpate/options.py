@@ -241,15 +241,16 @@ class FitOptions(SearchOptions):
     """Options of fitting a network to arrays."""
 
     effort: float = option(
-        1.0,
-        "multiplies the work of the search: 1 takes half a minute on one core at most, a minute for more than 10,000 "
-        "samples; 0.1 gives a quick look. The result depends on it, never on the machine",
+        0.02,
+        "work of the search: the default gives a first answer in about a second and says what more may bring; 1 tries "
+        "more kinds of networks, for half a minute on one core at most, a minute for more than 10,000 samples. The "
+        "result depends on it, never on the machine",
         above=0,
     )
     seconds: float | None = option(
         None,
-        "limit on time; left out: none. Below 30 s it plans for less work, and leaves out what still takes longer: the "
-        "result then depends on the machine",
+        "limit on time; left out: none. With the default effort as much work is planned as it allows, and what still "
+        "takes longer is left out: the result then depends on the machine",
         "s",
         above=0,
     )

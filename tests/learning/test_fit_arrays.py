@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -324,3 +326,68 @@ def test_a_missing_value_names_its_row_and_column(tabular, missing):
         palpate.fit(table, np.arange(60.0))
     with pytest.raises(UsageError, match=r"first in row 3 \(column 'y0'\)"):
         palpate.fit(table[["depth"]], table["count"])
+
+
+def test_the_default_is_quick_and_says_what_more_time_may_bring(fitted_240: Fitted):
+    # one round of folds of one kind, and no more work than the default has
+    assert 1 <= len(fitted_240.members) <= 5 or fitted_240.form == "kernel layer"
+    assert fitted_240.heldout < 1.5 * 0.05 / quick_rows(240)[1].std()
+    assert "time" in fitted_240.outlook
+    assert fitted_240.outlook in str(fitted_240)
+    noise = float(fitted_240.outlook.rpartition(" %")[0].rpartition(" ")[2]) / 100
+    # the rows scatter by 0.05; no network can be nearer to rows that it has not seen
+    assert noise == pytest.approx(0.05 / quick_rows(240)[1].std(), rel=0.3)
+
+
+def test_few_rows_are_said_in_words():
+    fitted = palpate.fit(*quick_rows(30))
+    assert fitted.outlook.startswith("Only 30 rows")
+    assert "More rows would help" in fitted.outlook
+
+
+def test_the_score_is_that_of_scikit_learn(fitted_240: Fitted):
+    X, y = quick_rows(240)
+    left = ((y - fitted_240.predict(X)) ** 2).sum()
+    assert fitted_240.score(X, y) == pytest.approx(1 - left / ((y - y.mean()) ** 2).sum(), rel=1e-12)
+    with pytest.raises(UsageError, match="do not fit"):
+        fitted_240.score(X, y[:-1])
+
+
+def test_a_fit_plots_the_rows_that_judged(fitted_240: Fitted, tmp_path: Path):
+    figure = fitted_240.plot(tmp_path / "fit.png")
+    assert (tmp_path / "fit.png").stat().st_size > 1000
+    points = figure.axes[0].lines[1]
+    measured, answered = points.get_data()
+    # the error that is stated is that of what is drawn
+    y = quick_rows(240)[1]
+    assert set(np.round(measured, 12)) <= set(np.round(y, 12))
+    assert np.sqrt(((measured - answered) ** 2).mean()) / y.std() == pytest.approx(
+        fitted_240.heldout, rel=0.05
+    )
+    loaded = Fitted.load(fitted_240.save(tmp_path / "fit.palpate"))
+    with pytest.raises(UsageError, match="no rows"):
+        loaded.plot()
+    assert len(loaded.plot(X=quick_rows(20)[0], Y=quick_rows(20)[1]).axes) == 1
+
+
+def test_a_fit_has_a_card_as_a_page(fitted_240: Fitted):
+    page = fitted_240.to_html()
+    assert fitted_240.card().kind in page
+    assert page.startswith("<!doctype html>")
+    assert fitted_240._repr_html_() in page
+    assert (
+        fitted_240.card().errors["error on samples held out, relative to the outputs' spread"]
+        == fitted_240.heldout
+    )
+
+
+@pytest.fixture(scope="module")
+def fitted_240() -> Fitted:
+    return palpate.fit(*quick_rows(240))
+
+
+def quick_rows(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of a smooth function of two inputs with noise of 0.05."""
+    rng = np.random.default_rng(2)
+    X = rng.uniform(-1, 1, (count, 2))
+    return X, np.sin(3 * X[:, 0]) * (1 + X[:, 1]) + 0.05 * rng.normal(size=count)

@@ -77,3 +77,33 @@ def one_sided(rod: Surrogate) -> Surrogate:
     """The same body, whose drawing knows one sign of the load."""
     field = dataclasses.replace(rod.fields["displacement"], mirror=None)
     return dataclasses.replace(rod, fields={"displacement": field})
+
+
+def loaded_twice(rod: Surrogate) -> Surrogate:
+    """A one-sided rod with a further input: a load that lifts its middle, and stiffens the tip a little."""
+    lift = Range("middle load", -2.0, 2.0, "N")
+
+    def widened(network: Network, share: np.ndarray) -> Network:
+        """Return the network with the further input, on which each output depends by an affine share (m,)."""
+        m = len(network.outputs)
+        scaling = network.scaling
+        return dataclasses.replace(
+            network,
+            inputs=(*network.inputs, lift),
+            factors=np.concatenate([network.factors, np.zeros((*network.factors.shape[:2], 1))], axis=2),
+            tail=np.hstack([network.tail, share.reshape(m, 1)]),
+            scaling=dataclasses.replace(
+                scaling,
+                input_centre=np.append(scaling.input_centre, 0.0),
+                input_half=np.append(scaling.input_half, lift.high),
+            ),
+        )
+
+    field = one_sided(rod).fields["displacement"]
+    x = field.points[field.columns[:, 0], 0]
+    up = np.where(field.columns[:, 1] == 1, 0.1 * x * x, 0.0) / field.network.scaling.output_scale
+    field = dataclasses.replace(field, network=widened(field.network, up))
+    rest = dataclasses.replace(rod.energy.baseline.rest, count=1)
+    baseline = dataclasses.replace(rod.energy.baseline, rest=rest, stiffening=Stiffening.none(2))
+    energy = LearntEnergy(widened(rod.energy.network, np.array([0.1])), baseline)
+    return dataclasses.replace(rod, energy=energy, fields={"displacement": field})

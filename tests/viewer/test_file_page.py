@@ -11,10 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bodies import loaded_twice
 from chromium_page import assert_no
 from playwright.sync_api import Browser, Page
 from slabs import carried_slab, dents, family, touched_slab
 
+import bent
 from palpate.errors import UsageError
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
@@ -65,7 +67,7 @@ def open_file(browser: Browser, file: Path) -> tuple[Page, list[str]]:
         ),
     )
     page.goto(file.as_uri())
-    page.wait_for_function("document.documentElement.dataset.middle !== undefined")
+    page.wait_for_function("['middle', 'tip'].some((place) => place in document.documentElement.dataset)")
     return page, complaints
 
 
@@ -145,10 +147,57 @@ def test_the_page_shows_its_model_card(opened: tuple[Page, list[str]], pressed: 
     assert "real-time loop" not in page.locator("#flags").inner_text()  # there is none that could be late
 
 
-def test_a_page_is_refused_where_its_shape_has_no_c_source(rod: Surrogate, tmp_path: Path):
-    with pytest.raises(UsageError, match="drawn as a line"):
-        export_html(rod, tmp_path / "rod.html")
-    assert rod._repr_html_() is None
+LINE = """(X) => {
+  const { line, hello } = palpate;
+  return X.map(([force, ...further]) => Array.from(line.held([0, 0, 0], [0, force, 0], further, 0)));
+}"""
+
+
+@pytest.fixture(scope="module")
+def opened_line(
+    rod: Surrogate, browser: Browser, tmp_path_factory
+) -> Iterator[tuple[Page, list[str], Surrogate]]:
+    """The page of a body drawn as a line, with a further input."""
+    body = loaded_twice(rod)
+    done = export_html(body, tmp_path_factory.mktemp("line") / "rod.html")
+    assert done.comparison is not None
+    assert done.comparison.passed
+    assert "line" in done.comparison.parts
+    page, complaints = open_file(browser, done.file)
+    yield page, complaints, body
+    page.context.close()
+
+
+def test_a_line_bends_on_its_page_as_palpate_bends_it(opened_line: tuple[Page, list[str], Surrogate]):
+    page, complaints, body = opened_line
+    field = body.fields["displacement"]
+    low, high = np.array([[r.low, r.high] for r in field.inputs]).T
+    X = np.random.default_rng(0).uniform(low, high, (50, 2))
+    got = np.array(page.evaluate(LINE, X.tolist())).reshape(50, -1, 3)
+    np.testing.assert_allclose(got, field.values(X), rtol=0, atol=1e-6)  # single precision is drawn
+    # and its force is that of the energy, further input and all
+    low, high = np.array([[r.low, r.high] for r in body.inputs]).T
+    U = np.random.default_rng(0).uniform(low, high, (50, 2))
+    places = np.column_stack([U[:, :1] @ body.energy.baseline.directions, U[:, 1]])
+    force = np.array(page.evaluate(ASK, places.tolist()))[:, 2:5]
+    np.testing.assert_allclose(force, body.energy.force(U), rtol=0, atol=1e-12 * np.abs(force).max())
+    assert_no(complaints)
+
+
+def test_a_further_input_of_a_line_is_a_slider_that_bends_it(opened_line: tuple[Page, list[str], Surrogate]):
+    page, complaints, _ = opened_line
+    slider = page.locator("#parameter-0")
+    before = page.evaluate("document.documentElement.dataset.tip")
+    slider.fill("2")
+    page.wait_for_function("(tip) => document.documentElement.dataset.tip !== tip", arg=before)
+    assert_no(complaints)
+
+
+def test_a_page_is_refused_where_its_rest_moves(tmp_path: Path):
+    body = bent.body()
+    with pytest.raises(UsageError, match="lies elsewhere"):
+        export_html(body, tmp_path / "rod.html")
+    assert body._repr_html_() is None
     assert not any(tmp_path.iterdir())
 
 

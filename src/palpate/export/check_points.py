@@ -236,12 +236,12 @@ def compare_body(
 
 def compare_network(
     network: Network,
-    ask: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+    ask: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray | None]],
     precision: Precision | None = None,
 ) -> Comparison:
     """Return how far an exported network is from palpate at 1,000 inputs, with its derivatives; by default in double.
 
-    `ask` takes inputs (N, n) and returns outputs (N, m) and derivatives (N, m, n).
+    `ask` takes inputs (N, n) and returns outputs (N, m) and derivatives (N, m, n), None where it has none.
     """
     precision = precision or Precision()
     low, high = bounds(network.inputs)
@@ -251,11 +251,11 @@ def compare_network(
     Y, J = ask(X)
     limit = np.minimum(_TIGHT * condition(network, X), _LOOSEST)
     limit = np.full(len(X), precision.tolerance) if precision.single else limit
-    slopes = np.stack([network.jacobian(x) for x in X]) * (high - low)
-    parts = {
-        "outputs": _difference(network.predict(X), Y, limit),
-        "derivatives": _difference(slopes.reshape(len(X), -1), (J * (high - low)).reshape(len(X), -1), limit),
-    }
+    parts = {"outputs": _difference(network.predict(X), Y, limit)}
+    if J is not None:
+        slopes = np.stack([network.jacobian(x) for x in X]) * (high - low)
+        rates = (J * (high - low)).reshape(len(X), -1)
+        parts["derivatives"] = _difference(slopes.reshape(len(X), -1), rates, limit)
     return Comparison(parts, precision.single)
 
 

@@ -32,11 +32,15 @@ class WasmCore:
     """One body in the module that pages run in wasmtime.
 
     It is given by the bytes of a `WeightsBlock`. `fields` are the field whose coefficients that block knows, then those
-    of `further` blocks, each with the arrays of one more field.
+    of `further` blocks, each with the arrays of one more field. `network` is the block of a network beside the body.
     """
 
     def __init__(
-        self, block: bytes, fields: Sequence[FieldSurrogate] = (), further: Sequence[bytes] = ()
+        self,
+        block: bytes,
+        fields: Sequence[FieldSurrogate] = (),
+        further: Sequence[bytes] = (),
+        network: bytes | None = None,
     ) -> None:
         wasmtime = wasmtime_module()
         if wasmtime is None:
@@ -52,10 +56,11 @@ class WasmCore:
         self._memory = self._exports["memory"]
         self._call("_initialize")
         at = room = self._call("room")
-        for place, part in enumerate((block, *further)):
+        opened = [("open", block), *(("open_field", part) for part in further)]
+        for call, part in opened if network is None else [*opened, ("open_network", network)]:
             self._reserve(at + len(part))
             self._memory.write(self._store, part, at)
-            fault = self._call("open_field", at, len(part)) if place else self._call("open", len(part))
+            fault = self._call(call, len(part)) if call == "open" else self._call(call, at, len(part))
             if fault:
                 raise UsageError(
                     f"The core refuses this block of weights (fault {fault}).",
@@ -72,9 +77,11 @@ class WasmCore:
         block: WeightsBlock,
         fields: Sequence[FieldSurrogate] = (),
         further: Sequence[WeightsBlock] = (),
+        network: WeightsBlock | None = None,
     ) -> WasmCore:
         """Return the core with blocks that are not yet bytes."""
-        return cls(block.to_bytes(), fields, [part.to_bytes() for part in further])
+        whole = None if network is None else network.to_bytes()
+        return cls(block.to_bytes(), fields, [part.to_bytes() for part in further], whole)
 
     def show(self, index: int) -> WasmCore:
         """Return the core itself, which from now on answers `shapes` of this field."""
@@ -104,6 +111,15 @@ class WasmCore:
             self._ask(x)
             row[20] = self._call("trust")
             row[:20] = self._read(self._call("answered"), 20)
+        return out
+
+    def predict(self, X: np.ndarray, outputs: int) -> np.ndarray:
+        """Return the outputs (N, m) of the network beside the body for each row of X (N, n)."""
+        out = np.empty((len(X), outputs))
+        for row, x in zip(out, X, strict=True):
+            self._ask(x)
+            self._call("predict")
+            row[:] = self._read(self._call("shaped"), outputs)
         return out
 
     def walk(self, X: np.ndarray) -> np.ndarray:

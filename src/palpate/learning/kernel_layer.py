@@ -52,6 +52,15 @@ class Metric:
         C[np.diag_indices(len(C))] += self.ridge * noise
         return C if np.isinf(self.slopes) else C + self.slopes * (X @ X.T)
 
+    def noise(self, X: np.ndarray, Y: np.ndarray) -> float:
+        """Return the standard deviation of the noise, root mean square of the outputs, that the likelihood sees.
+
+        X (N, n) and Y (N, k) are scaled; a plane is taken off, as for the likelihood.
+        """
+        one = _tail(X)
+        Y = Y - one @ np.linalg.lstsq(one, Y, rcond=None)[0]
+        return float(np.sqrt(self.ridge * max((Y * _solve_weights(self.covariance(X), Y)).mean(), 0.0)))
+
     def altered(self, scale: float, ridge: float) -> Metric:
         """Return the metric with all scales and the ridge multiplied by two factors."""
         return replace(self, scales=self.scales * scale, ridge=self.ridge * ridge)

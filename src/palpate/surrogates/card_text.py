@@ -5,13 +5,14 @@ The same names and values stand in the card's JSON as the file has them.
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from palpate.format import share
 
-__all__ = ["bullets", "escape_markdown", "rows"]
+__all__ = ["bullets", "escape_markdown", "html_page", "html_record", "rows"]
 
 _RELATIVE = ("error", "RMSE", "percentile", "median", "p95", "share")  # names of figures that are shares
 _METRES = (
@@ -83,6 +84,27 @@ def escape_markdown(text: str) -> str:
     for mark in ("\\", "`", "*", "_", "[", "]", "<", ">", "|", "#"):
         text = text.replace(mark, f"\\{mark}" if mark not in "<>" else {"<": "&lt;", ">": "&gt;"}[mark])
     return text.replace("\n", " ")
+
+
+def html_record(name: str, kind: str, parts: Mapping[str, Any]) -> str:
+    """Return titles, with texts, lists or records of texts under them, as a part of an HTML page; all is escaped."""
+    lines = [f"<h2>{html.escape(name)}</h2>", f"<p>{html.escape(kind)}</p>", "<dl>"]
+    for title, part in parts.items():
+        items = [f"{key}: {value}" for key, value in part.items()] if isinstance(part, Mapping) else part
+        texts = [items] if isinstance(items, str) else items
+        lines.append(f"<dt><b>{html.escape(title)}</b></dt>")
+        lines += [f'<dd style="overflow-wrap: anywhere">{html.escape(str(text))}</dd>' for text in texts]
+    return "\n".join([*lines, "</dl>"])
+
+
+def html_page(title: str, part: str) -> str:
+    """Return a page that holds a part alone, and needs nothing else."""
+    return (
+        f'<!doctype html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{html.escape(title)}</title>\n'
+        '<meta name="viewport" content="width=device-width"><style>body { font: 16px/1.5 system-ui, sans-serif; '
+        "max-width: 44em; margin: 2em auto; padding: 0 1em; }</style></head>\n"
+        f"<body>\n{part}\n</body>\n</html>\n"
+    )
 
 
 def _record_lines(label: str, name: str, value: Any, escape: Callable[[str], str], depth: int) -> list[str]:

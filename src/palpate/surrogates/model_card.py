@@ -17,7 +17,7 @@ from typing import Any
 
 from palpate.errors import UsageError
 from palpate.format import count, millimetres
-from palpate.surrogates.card_text import bullets, escape_markdown, rows
+from palpate.surrogates.card_text import bullets, escape_markdown, html_page, html_record, rows
 from palpate.units import Range
 
 __all__ = ["FORMAT_VERSION", "NOT_STATED", "ModelCard", "card_of"]
@@ -81,6 +81,24 @@ class ModelCard:
     def to_markdown(self) -> str:
         """Return the card as Markdown."""
         return self._page(escape_markdown)
+
+    def to_html(self) -> str:
+        """Return the card as one HTML page."""
+        return html_page(f"Model card: {self.name}", self._repr_html_())
+
+    def _repr_html_(self) -> str:
+        """Return the card as a part of a page, as a notebook shows it."""
+        answers = self.answers
+        inputs = [
+            (r["name"], f"{r['low']:.6g} to {r['high']:.6g} {r['unit']}".strip()) for r in answers["inputs"]
+        ]
+        parts = {
+            "inputs": dict(inputs),
+            "answers": answers["outputs"],
+            "inside": answers["inside"],
+            **self.in_words(),
+        }
+        return html_record(self.name, self.kind, parts)
 
     def __str__(self) -> str:
         return self._page(str)

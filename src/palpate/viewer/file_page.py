@@ -21,7 +21,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from palpate.devices import device_traits
-from palpate.errors import UsageError
 from palpate.export.build_core import built_core
 from palpate.export.check_points import Comparison, ExportedFile, compare_body, compare_field
 from palpate.export.field_tables import PROMISE, SURFACE, field_tables
@@ -31,9 +30,10 @@ from palpate.files import write_file
 from palpate.format import script_json
 from palpate.output_files import require_outputs, with_seal
 from palpate.runtime.touchable import touchable
-from palpate.surrogates import FieldSurrogate, Surrogate
+from palpate.surrogates import FieldSurrogate, NodeField, Surrogate
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.viewer.about_record import about_record
+from palpate.viewer.file_line import compare_line, line_facts, refuse_moving_rest
 from palpate.viewer.messages import Hello, Modes
 from palpate.viewer.packed_surface import PackedSurface, rounded_points
 from palpate.viewer.page_model import PageModel
@@ -74,7 +74,7 @@ def export_html(
 ) -> ExportedPage:
     """Write a learnt body as NAME.html, and compare what it answers with palpate if wasmtime is installed.
 
-    A probe presses the body or a pad holds it; a body drawn as a line has no page. Where the core does not answer as
+    A probe presses the body, a pad holds it, or a hand holds a node of a line. Where the core does not answer as
     palpate does, nothing is written. `overwrite` replaces files whatever they are; by default those alone that an
     earlier export wrote.
     """
@@ -89,7 +89,7 @@ def export_html(
 
 
 def html_page(surrogate: Surrogate) -> str:
-    """Return a learnt body as one HTML file; one that is drawn as a line, or has a part without C source, has none."""
+    """Return a learnt body as one HTML file; one whose rest moves, or with a part without C source, has none."""
     return _Page.of(surrogate).text
 
 
@@ -114,17 +114,20 @@ class _Page:
     fields: tuple[_PageField, ...]
     left_out: tuple[str, ...]
     text: str
+    nodes: WeightsBlock | None = None  # the network of a line's nodes
 
     @classmethod
     def of(cls, surrogate: Surrogate) -> _Page:
         """Return the page of a body with as many of its fields as it has room for."""
-        _refuse_lines(surrogate)
+        refuse_moving_rest(surrogate)
         surrogate = _shallow(surrogate)
         model = PageModel(touchable(surrogate))
-        assert model.surface is not None
         traits = device_traits("page")
         place = model.body.workspace(traits.radius)
         hello = model.hello(_Settings(place.scale, place.radius, traits.max_force), RATE)
+        if model.body.line is not None:
+            return cls._of_line(surrogate, model.body.line, hello)
+        assert model.surface is not None
         # what carries the body's own surface, where there is one
         coarse = SurfaceDrawing(model.body, detail=False)
         step = _step(np.asarray(model.surface.rest), hello)
@@ -167,13 +170,42 @@ class _Page:
             "surface": surface.facts,
             "drawn": drawn,
             "fields": [field.facts for field in fields],
+            "line": None,
         }
         parts |= {"hello": _packed(hello.to_json().encode()), "facts": _packed(json.dumps(facts).encode())}
         text = _document(surrogate.name, parts, card.to_json())
         return cls(surrogate, bare, tuple(fields), left_out, text)
 
+    @classmethod
+    def _of_line(cls, surrogate: Surrogate, line: NodeField, hello: Hello) -> _Page:
+        """Return the page of a body that is drawn as a line: the network of its nodes in place of a surface."""
+        block = WeightsBlock.of(surrogate)
+        card = card_of(surrogate).with_hash(f"{block.label}, of a page", block.hash)
+        nodes = WeightsBlock.of_network(line.network)
+        facts: dict[str, Any] = {
+            "places": None,
+            "surface": None,
+            "drawn": None,
+            "fields": [],
+            "line": line_facts(line, surrogate),
+        }
+        hello = replace(hello, meta=about_record(surrogate.meta) | about_record(_card_in_words(card)))
+        parts = {
+            "core": _packed(built_core("core.wasm")),
+            "weights-0": _packed(_by_weight(block.to_bytes())),
+            "line": _packed(_by_weight(nodes.to_bytes())),
+            "hello": _packed(hello.to_json().encode()),
+            "facts": _packed(json.dumps(facts).encode()),
+        }
+        text = _document(surrogate.name, parts, card.to_json())
+        return cls(surrogate, block, (), (), text, nodes)
+
     def compare(self) -> Comparison:
         """Return how far the core is from palpate, with the fields as the page sums them up."""
+        if self.nodes is not None:
+            core = WasmCore.of(self.block, network=self.nodes)
+            whole = compare_body(self.surrogate, core)
+            return replace(whole, parts={**whole.parts, "line": compare_line(self.surrogate, core)})
         rounded, further = (
             [field.rounded for field in self.fields],
             [field.block for field in self.fields[1:]],
@@ -185,15 +217,6 @@ class _Page:
             for i, field in enumerate(self.fields)
         }
         return replace(whole, parts={**whole.parts, **parts})
-
-
-def _refuse_lines(surrogate: Surrogate) -> None:
-    if touchable(surrogate).line is not None:
-        raise UsageError(
-            f"The body {surrogate.name!r} can't be a page that is one file.",
-            why="It is drawn as a line, and the shape of a bent beam has no C source.",
-            fix="Export its force with `palpate export c`, or show it with `palpate view`.",
-        )
 
 
 def _shallow(surrogate: Surrogate) -> Surrogate:

@@ -11,6 +11,7 @@ static pp_array wasm_arrays[PP_ARRAYS];
 static const pp_model wasm_model = {wasm_arrays};
 static pp_array wasm_further[WASM_FIELDS][PP_ARRAYS]; /* of further fields of the same body */
 static int32_t wasm_fields;                           /* how many these are */
+static pp_array wasm_network[PP_ARRAYS];              /* a network of its own, such as that of a bent line */
 static pp_real wasm_asked[3 + PP_MOST], wasm_answer[PP_ANSWER + 1];
 static pp_real *wasm_work; /* behind the block: for the deviation, the state of the memory, the shape of a touch */
 static pp_real *wasm_state, *wasm_shape;
@@ -24,22 +25,39 @@ PP_EXPORT("open") int32_t wasm_open(uint32_t size) {
   return pp_open((const uint8_t *)(uintptr_t)wasm_room(), size, wasm_arrays);
 }
 
-/* Open a block at `at` that holds the arrays of one more field and no others; what is wrong with it. */
-PP_EXPORT("open_field") int32_t wasm_open_field(uint32_t at, uint32_t size) {
+/* Find the arrays of a further block at `at`; what is wrong with it. */
+static int32_t wasm_find(uint32_t at, uint32_t size, pp_array *own) {
   const unsigned char *bytes = (const unsigned char *)(uintptr_t)at;
-  pp_array *own = wasm_further[wasm_fields];
   int32_t i;
-  if (wasm_fields == WASM_FIELDS || size < PP_BLOCK_HEAD + PP_ARRAYS * PP_BLOCK_ROW || memcmp(bytes, "PALPATE", 8)) return PP_NO_BLOCK;
+  if (size < PP_BLOCK_HEAD + PP_ARRAYS * PP_BLOCK_ROW || memcmp(bytes, "PALPATE", 8)) return PP_NO_BLOCK;
   if (pp_word(bytes + 16) != size || size % 8) return PP_DAMAGED;
   if (pp_checksum(bytes + PP_BLOCK_HEAD, size - PP_BLOCK_HEAD) != pp_word(bytes + 24)) return PP_DAMAGED;
   for (i = 0; i < PP_ARRAYS; i++) {
     if (!pp_find(bytes, size, bytes + PP_BLOCK_HEAD + PP_BLOCK_ROW * i, &own[i])) return PP_MISFIT;
   }
+  return PP_OPEN;
+}
+
+/* Open a block at `at` that holds the arrays of one more field and no others; what is wrong with it. */
+PP_EXPORT("open_field") int32_t wasm_open_field(uint32_t at, uint32_t size) {
+  pp_array *own = wasm_further[wasm_fields];
+  int32_t fault, i;
+  if (wasm_fields == WASM_FIELDS) return PP_NO_BLOCK;
+  fault = wasm_find(at, size, own);
+  if (fault != PP_OPEN) return fault;
   own[PP_HEAD] = wasm_arrays[PP_HEAD];
   for (i = 0; i < 3; i++) own[PP_FIELD_SURFACE + i] = wasm_arrays[PP_FIELD_SURFACE + i];
   if (!own[PP_FIELD].whole) return PP_MISFIT;
   wasm_fields++;
   return PP_OPEN;
+}
+
+/* Open a block at `at` that holds a network alone; what is wrong with it. */
+PP_EXPORT("open_network") int32_t wasm_open_network(uint32_t at, uint32_t size) {
+  const int32_t fault = wasm_find(at, size, wasm_network);
+  if (fault != PP_OPEN) return fault;
+  if (!wasm_network[PP_HEAD].whole || !wasm_network[PP_NET + PP_SIZES].whole) return PP_MISFIT;
+  return wasm_network[PP_HEAD].whole[PP_INPUTS] <= PP_MOST ? PP_OPEN : PP_MISFIT;
 }
 
 static int32_t wasm_size_of(const pp_array *arrays) {
@@ -62,6 +80,10 @@ PP_EXPORT("needs") uint32_t wasm_needs(uint32_t size) {
   for (k = 0; k <= wasm_fields; k++) {
     const uint32_t own = (uint32_t)wasm_size_of(wasm_field(k));
     shape = own > shape ? own : shape;
+  }
+  if (wasm_network[PP_HEAD].whole) { /* outputs, and the latent ones behind them */
+    const int32_t both = wasm_network[PP_HEAD].whole[PP_OUTPUTS] + wasm_network[PP_NET + PP_SIZES].whole[4];
+    shape = (uint32_t)both > shape ? (uint32_t)both : shape;
   }
   return (work + state + shape) * (uint32_t)sizeof(pp_real) + 32u;
 }
@@ -105,4 +127,23 @@ PP_EXPORT("start") void wasm_start(void) {
 PP_EXPORT("touch") int32_t wasm_touch(int32_t k) {
   const pp_model model = {wasm_field(k)};
   return pp_touch_shape(&model, wasm_asked, wasm_asked + 3, wasm_shape);
+}
+
+/* Outputs of the network at the inputs that were asked, in place of a shape. */
+PP_EXPORT("predict") void wasm_predict(void) {
+  const pp_array *net = wasm_network + PP_NET;
+  const int32_t outputs = wasm_network[PP_HEAD].whole[PP_OUTPUTS], n = net[PP_SIZES].whole[0], count = net[PP_SIZES].whole[4];
+  const pp_real *modes = net[PP_TAIL].real + (1 + n) * count;
+  pp_real xi[PP_MOST], *latent = wasm_shape + outputs;
+  int32_t o, k;
+  pp_scale(net, wasm_asked, xi);
+  pp_latent(net, xi, latent, 0);
+  for (o = 0; o < outputs; o++) {
+    if (net[PP_TAIL].n[0] == (1 + n) * count) { /* the latent outputs are the outputs */
+      wasm_shape[o] = latent[o];
+      continue;
+    }
+    wasm_shape[o] = modes[o];
+    for (k = 0; k < count; k++) wasm_shape[o] += latent[k] * modes[(1 + k) * outputs + o];
+  }
 }

@@ -30,6 +30,7 @@ from palpate.learning.arrays.fit_notes import notes_on
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import HeldOut
 from palpate.learning.arrays.influence import Influence
+from palpate.learning.arrays.judged_rows import JudgedRows
 from palpate.learning.arrays.members import ROWS, Crossed, CrossedLayers
 from palpate.learning.ensemble import Ensemble
 from palpate.learning.kernel_layer import KernelLayer, Metric
@@ -319,4 +320,6 @@ class Finish:
             tuple(self.problem.network(*one, radial, heldout=heldout) for one in members),
         )
         notes = notes_on(self.samples, self.problem, fitted, evidence.missed, rows, self.scales)
-        return replace(fitted, notes=notes)
+        wanted = self.samples.Y[rows]
+        judged = JudgedRows(wanted, wanted - evidence.missed * self.problem.scaling.output_scale)
+        return replace(fitted, notes=notes, judged=judged)

@@ -26,7 +26,7 @@ from palpate.learning.arrays.array_samples import ArrayProblem, Samples
 from palpate.learning.arrays.calibration import Finish
 from palpate.learning.arrays.close_copies import better_with_copies, problem_without_copies
 from palpate.learning.arrays.few_rows import best_of_few, few_places
-from palpate.learning.arrays.fit_notes import IDLE
+from palpate.learning.arrays.fit_notes import IDLE, outlook
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import RIDGE, HeldOut, carry, forms_for
 from palpate.learning.arrays.many_rows import MANY_ROWS, SUBSET, ManyRows, RowParts, Structure
@@ -54,17 +54,14 @@ __all__ = ["fit"]
 _error = attrgetter("error")  # of a candidate, on held-out samples
 _WORK = 5e11  # multiplications at effort 1: half a minute at most
 _PLANNED_SECONDS = 30.0  # of that work: a shorter limit on time plans for less
-_FULL_NUMBERS, _LOOK_NUMBERS = (
-    1500,
-    600,
-)  # unknowns in the units of a candidate at effort 1, and at a first look
+# unknowns in the units of a candidate at effort 1, and at a first look
+_FULL_NUMBERS, _LOOK_NUMBERS = 1500, 600
 _METRIC_SAMPLES = 500  # of which a likelihood is computed; its work goes with their cube
 _CROSSED_FOLDS, _CROSSED_ROUNDS = 5, 2  # of the networks learnt crosswise: ten in all
+_QUICK = 0.03  # effort below which one round of folds judges one kind: a first answer in about a second
 _CROSSED_SHARE = 0.5  # of all work, for the networks learnt crosswise
 _CROSSED_PLACES = 60  # of fewer places no network was ever ahead of a Gaussian process
-_LAYER_FOLDS = (
-    10  # of a kernel layer: the final one learns from all samples, and fewer folds would say too much
-)
+_LAYER_FOLDS = 10  # of a kernel layer, whose final one learns from all samples: fewer would say too much
 _LAYER_STEPS = 15  # of the likelihood without a fold, from the metric of all samples
 _CLOSE_TO_LAYER = 1.3  # times the kernel layer's error: a mean of ten networks may still miss less
 _HOPELESS = 3.0  # times the kernel layer's error after the first stages: no refinement makes up for that
@@ -128,17 +125,24 @@ def fit(
     budget, seconds = Budget.of(options.effort, options.seconds), options.seconds
     samples = Samples.of(X, Y, inputs, outputs, lines)
     if seconds is not None:  # fitting to all samples and freezing come after the search
-        budget = Budget(min(budget.effort, seconds / _PLANNED_SECONDS), began + 0.85 * seconds)
+        planned = seconds / _PLANNED_SECONDS
+        asked = 1.0 if budget.effort == FitOptions().effort else budget.effort
+        budget = Budget(min(asked, planned), began + 0.85 * seconds)
     with threadpool_limits(1):  # small matrices: threads would cost more than they bring
         some, problem, places = problem_without_copies(samples)
         context = some, problem, places, began, budget, options
         if len(places) > MANY_ROWS:
-            fitted = _Chooser(*context, RowParts.of(places, options.seed)).chosen_for_many()
+            chooser = _Chooser(*context, RowParts.of(places, options.seed))
+            fitted = chooser.chosen_for_many()
         else:
             chooser = _Chooser(*context)
             fitted = chooser.chosen_of_few() if few_places(places) else chooser.chosen()
             fitted = better_with_copies(fitted, samples, some, options)
-    fitted = replace(fitted, columns=samples.columns)
+        few = len(places) <= MANY_ROWS and few_places(places)
+        fitted = replace(fitted, seconds=time.monotonic() - began)
+        enough = options.target or 0.0
+        words = outlook(len(some.X), fitted, options.effort, noise=chooser.noise(), few=few, enough=enough)
+    fitted = replace(fitted, columns=samples.columns, outlook=words)
     for note in fitted.notes:
         if not note.startswith(IDLE):
             warnings.warn(note, FitWarning, stacklevel=3)
@@ -169,6 +173,7 @@ class _Chooser:
             max(options.target or 0.0, _ROUND_OFF) * problem.unit
         )  # per latent output, as all errors
         self.total = _WORK * budget.effort
+        self.quick = budget.effort < _QUICK
         self.work = Work(self.total, self.budget.deadline)
         self.size = min(2.0, math.sqrt(budget.effort))
         self.share = 0.15 if len(self.X) >= 1000 else 0.2
@@ -178,6 +183,7 @@ class _Chooser:
         self._layer = partial(KernelLayer.fit, seed=self.seed, most=self.centres)
         self.trials: list[Trial] = []
         self.ran: list[Candidate] = []
+        self.metric: Metric | None = None  # the best of a kernel layer, once it is known
         self.reserve = _CROSSED_SHARE * self.total  # for the networks learnt crosswise
         self._finish_with = partial(Finish, samples, problem, self.trials, began, options.level, places)
 
@@ -229,6 +235,12 @@ class _Chooser:
             trials=self.trials,
         )
         return rows.fitted(structure, self.scales, self._last_stage)
+
+    def noise(self) -> float:
+        """Return the noise that the likelihood of a process sees in the samples, relative to the outputs' spread."""
+        if self.metric is None:
+            return 0.0
+        return self.metric.noise(self.X[:_METRIC_SAMPLES], self.Y[:_METRIC_SAMPLES]) / self.problem.unit
 
     def _winner(self, mark: float) -> Candidate:
         """Return the best form, radial function and size, refined where the kernel layer is not far ahead."""
@@ -294,6 +306,7 @@ class _Chooser:
                 trial = self._kernel_error(other)
                 if trial < error:
                     error, best = trial, other
+        self.metric = best
         return best, error
 
     def _kernel_error(self, metric: Metric) -> float:
@@ -376,7 +389,7 @@ class _Chooser:
         """Return of small networks, soon refined, the one whose form does best on two further folds too."""
         best = _best_of(looks)
         close = [one for one in looks if one.error <= 1.5 * best.error]
-        if len(close) == 1 or best.error <= self.target:
+        if self.quick or len(close) == 1 or best.error <= self.target:
             return best
         squares = np.array([one.error**2 for one in close])
         for k in (1, 2):
@@ -416,7 +429,7 @@ class _Chooser:
     def _finalist(self, winner: Candidate) -> Crossed | None:
         """Return the networks of the best kind, learnt crosswise: the winner's, or a rival's if work allows."""
         best = self._learn_crosswise(winner)
-        for rival in self._rivals(winner) if best is not None else ():
+        for rival in self._rivals(winner) if best is not None and not self.quick else ():
             if self.work.left < 1.3 * _CROSSED_ROUNDS * _CROSSED_FOLDS * self._fresh(rival).work(self.split):
                 break
             other = self._learn_crosswise(self._run([rival], rival.iterations, self.split, record=False)[0])
@@ -438,7 +451,8 @@ class _Chooser:
         Each stops by other samples than those that it is judged by: on a handful the best iterate is there by luck.
         """
         fresh = self._fresh(winner)
-        rounds = min(_CROSSED_ROUNDS, int(self.work.left / (1.1 * _CROSSED_FOLDS * fresh.work(self.split))))
+        most = 1 if self.quick else _CROSSED_ROUNDS
+        rounds = min(most, int(self.work.left / (1.1 * _CROSSED_FOLDS * fresh.work(self.split))))
         if rounds < 1:
             return None
         masks = [

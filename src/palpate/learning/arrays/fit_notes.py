@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.format import by_number, share
+from palpate.format import by_number, duration, share
 
 if TYPE_CHECKING:
     from palpate.learning.arrays.array_samples import ArrayProblem, Samples
     from palpate.learning.arrays.fitted import Fitted
 
-__all__ = ["IDLE", "notes_on", "wild_note", "wild_rows"]
+__all__ = ["IDLE", "notes_on", "outlook", "wild_note", "wild_rows"]
 
 # of the outputs' standard deviation: a network that misses so much says no more than their mean
 _NO_BETTER = 0.95
@@ -26,6 +26,10 @@ _SMALL_OUTPUT = (
 )
 _IRRELEVANT = 0.02  # of the largest scale of an input
 _LISTED = 5  # outputs that a note names
+_EXACT = 1e-4  # of the outputs' spread: nobody waits for less
+_NOISY = 0.8  # of the error that is noise, from which the rest is not worth the time
+# time at effort 1 over that at the default: five times for some hundred rows, twelve for a thousand
+_FULL, _ROWS = (5.0, 12.0), 80.0
 IDLE = "Inputs that hardly matter:"  # not worth a warning
 
 
@@ -58,6 +62,32 @@ def notes_on(
         if idle:
             notes.append(f"{IDLE} {', '.join(idle)}.")
     return tuple(notes)
+
+
+def outlook(rows: int, fitted: Fitted, effort: float, *, noise: float, few: bool, enough: float) -> str:
+    """Return what more time, or more rows, may bring, in a sentence.
+
+    No time takes away the noise of the rows, which is relative to the outputs' spread as the errors are. `enough` is
+    the error that was asked for, `few` says that every row was left out in turn.
+    """
+    if fitted.heldout <= max(enough, _EXACT):
+        return ""
+    if few:
+        return (
+            f"Only {rows} rows: each was left out in turn to judge by, and the error itself is uncertain by a factor "
+            f"of about {1.0 + 2.0 / np.sqrt(2.0 * rows):.1f}. More rows would help; more time hardly does."
+        )
+    least = min(noise, fitted.heldout)
+    if noise > _NOISY * fitted.heldout:
+        return f"More time would bring little: the rows themselves seem to scatter by {share(least)}."
+    if effort >= 1.0:
+        return ""
+    factor = float(np.clip(rows / _ROWS, *_FULL))
+    took = duration(float(f"{max(factor * fitted.seconds, 1.0):.1g}"))
+    return (
+        f"More time (effort=1, about {took}) may bring less; not below {share(least)}, by which the rows themselves "
+        "seem to scatter."
+    )
 
 
 def wild_note(rows: Sequence[int], count: int, lines: Sequence[int] | None = None) -> str:

@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.format import duration, share
 from palpate.learning.arrays.array_samples import points
 from palpate.learning.arrays.influence import Influence
+from palpate.learning.arrays.judged_rows import JudgedRows, measured
 from palpate.learning.search import Trial
 from palpate.network import Network, TrainedRegion
 from palpate.network.uncertainty import Uncertainty
+from palpate.surrogates.model_card import ModelCard, card_of
 
 __all__ = ["Fitted"]
 
@@ -60,6 +63,10 @@ class Fitted:
         inputs if empty.
     influence : Influence, optional
         How the answers hang on single samples, where these were few.
+    outlook : str
+        What more time, or more rows, may bring; "" for a network read from a file.
+    judged : JudgedRows, optional
+        The rows that judged, with what was answered there before they were learnt; not in a file.
     """
 
     network: Network
@@ -77,6 +84,8 @@ class Fitted:
     notes: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
     influence: Influence | None = None
+    outlook: str = ""
+    judged: JudgedRows | None = None
 
     def predict(self, X: Any) -> np.ndarray:
         """Return outputs (N, m) at inputs X (N, n); (N,) where Y was.
@@ -157,6 +166,79 @@ class Fitted:
         # written so that a point that is not a number is not trusted
         return np.asarray((far <= self.region.radius) & agree)
 
+    def score(self, X: Any, Y: Any) -> float:
+        """Return the coefficient of determination R², mean of the outputs, as scikit-learn's regressors do.
+
+        1 is perfect, 0 is as good as the outputs' mean. A constant output counts 1 where it is met, else 0.
+
+        Parameters
+        ----------
+        X : (N, n)
+            Inputs, SI units; two rows at least.
+        Y : (N, m) or (N,)
+            What was measured there.
+
+        Raises
+        ------
+        UsageError
+            If X or Y has the wrong shape.
+        """
+        X = self._points(X)
+        Y = measured(Y, len(X), len(self.network.outputs))
+        left = ((Y - self.network.predict(X)) ** 2).sum(axis=0)
+        whole = ((Y - Y.mean(axis=0)) ** 2).sum(axis=0)
+        ratio = left / np.where(whole > 0, whole, 1.0)
+        return float(np.where(whole > 0, 1.0 - ratio, np.where(left > 0, 0.0, 1.0)).mean())
+
+    def plot(self, path: str | os.PathLike[str] | None = None, *, X: Any = None, Y: Any = None) -> Any:
+        """Return a Matplotlib figure of answers over what was measured, with the share that the intervals hold.
+
+        Parameters
+        ----------
+        path : path, optional
+            File in which it is saved too, such as ``fit.png``.
+        X, Y : (N, n) and (N, m), optional
+            Rows to compare with; by default those that judged, as they were answered before they were learnt.
+
+        Raises
+        ------
+        UsageError
+            If a network read from a file is given no rows, or arrays have the wrong shape.
+        """
+        if X is not None:
+            X = self._points(X)
+            Y = measured(Y, len(X), len(self.network.outputs))
+            rows = JudgedRows(Y, self.network.predict(X), "answers at the rows given")
+        elif self.judged is not None:
+            rows = self.judged
+        else:
+            raise UsageError(
+                "There are no rows to compare with.",
+                why="A file keeps the network, not the rows that it was learnt from.",
+                fix="Pass rows: model.plot(X=X, Y=Y).",
+            )
+        return rows.plot(
+            self.network.outputs, f"{self._kind}\nerror {share(self.heldout)} of the spread", path
+        )
+
+    def card(self, file: str | os.PathLike[str] | None = None) -> ModelCard:
+        """Return the model card: inputs with their ranges, error, limits and hashes.
+
+        Parameters
+        ----------
+        file : path, optional
+            Its file, whose hash goes into the card.
+        """
+        return card_of(self._recorded(), file)
+
+    def to_html(self) -> str:
+        """Return the model card as one HTML page."""
+        return self.card().to_html()
+
+    def _repr_html_(self) -> str:
+        """Show the model card in a notebook."""
+        return self.card()._repr_html_()
+
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the network with its uncertainty and region to a network file.
 
@@ -175,6 +257,12 @@ class Fitted:
             region["member_tails"] = np.stack([member.tail for member in self.members])
         if self.influence is not None:
             region |= self.influence.arrays()
+        network = self._recorded(network)
+        return replace(network, extras={**network.extras, **region}).save(path)
+
+    def _recorded(self, network: Network | None = None) -> Network:
+        """Return the network, by default as it answers, with the record of its choice."""
+        network = self.network if network is None else network
         kept = {
             "notes": list(self.notes),
             "form": self.form,
@@ -183,8 +271,7 @@ class Fitted:
             "one_output": self.one_output,
             "columns": list(self.columns),
         }
-        whole = replace(network, extras={**network.extras, **region}, meta={**network.meta, "choice": kept})
-        return whole.save(path)
+        return replace(network, meta={**network.meta, "choice": kept})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Fitted:
@@ -210,7 +297,22 @@ class Fitted:
 
     def __str__(self) -> str:
         n, m = len(self.network.inputs), len(self.network.outputs)
-        what = (
+        took = f"{duration(self.seconds)}; " if self.seconds else ""
+        lines = [
+            f"Fitted: {n} input{'s' * (n > 1)} → {m} output{'s' * (m > 1)}, {self._kind}",
+            f"  {took}error {share(self.heldout)} of the outputs' spread on rows held out; "
+            f"intervals of {self.level:.0%}",
+        ]
+        lines += [f"  {self.outlook}"] if self.outlook else []
+        lines += [f"  {note}" for note in self.notes]
+        if self.trials:
+            lines += self._attempt_lines()
+        return "\n".join(lines)
+
+    @property
+    def _kind(self) -> str:
+        """The network in words."""
+        return (
             "the mean of the outputs"
             if self.form == "mean"
             else "an affine function"
@@ -219,14 +321,6 @@ class Fitted:
             if self.form != "kernel layer"
             else f"a kernel layer of {self.units} {self.radial} units"
         )
-        lines = [
-            f"Fitted: {n} input{'s' * (n > 1)} → {m} output{'s' * (m > 1)}, {what}",
-            f"  held-out error {self.heldout:.1e} of the outputs' spread; intervals of {self.level:.0%}",
-        ]
-        lines += [f"  {note}" for note in self.notes]
-        if self.trials:
-            lines += self._attempt_lines()
-        return "\n".join(lines)
 
     def _attempt_lines(self) -> list[str]:
         """Return the best networks that were tried, the best of the chosen form among them, as lines.
@@ -241,9 +335,7 @@ class Fitted:
         shown = list(best.values())[:_SHOWN]
         if chosen is not None and chosen not in shown:
             shown = [*shown[: _SHOWN - 1], chosen]
-        head = (
-            f"  {len(best)} tried in {self.seconds:.1f} s, judged only by the samples that chose, among them:"
-        )
+        head = f"  {len(best)} tried, judged only by the samples that chose, among them:"
         mark = "  (chosen; judged anew above)"
         return [head, *(f"    {t.error:.1e}  {t.name}{mark * (t is chosen)}" for t in shown)]
 

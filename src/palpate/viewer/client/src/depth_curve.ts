@@ -54,7 +54,7 @@ export class DepthCurve {
     pen.textAlign = "right";
     pen.fillText(`${tidy(high)} N`, MARGIN.left - 4, y(high) + 8);
     pen.fillText("0", MARGIN.left - 4, y(0));
-    pen.fillText(`${tidy(1000 * most)} mm deep`, width - MARGIN.right, height - 6);
+    pen.fillText(`${tidy(1000 * most)} mm ${hello.holds ? "moved" : "deep"}`, width - MARGIN.right, height - 6);
     for (const known of [false, true]) {
       pen.strokeStyle = known ? accent : soft;
       pen.lineWidth = known ? 2 : 1;

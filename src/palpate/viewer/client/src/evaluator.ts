@@ -28,6 +28,8 @@ interface Core {
   answered(): number;
   shaped(): number;
   open_field(at: number, size: number): number;
+  open_network(at: number, size: number): number;
+  predict(): void;
   shape_size(field: number): number;
   answer(): number;
   trust(): number;
@@ -63,18 +65,19 @@ export class Evaluator {
 
   /**
    * A body from its block of weights and those of its further fields; rejects one that is damaged or of another version.
-   * `places`: at how many it keeps indentations.
+   * `places`: at how many it keeps indentations. `network`: the block of a network beside the body.
    */
-  static async of(module: BufferSource, blocks: Uint8Array[], places = 0): Promise<Evaluator> {
+  static async of(module: BufferSource, blocks: Uint8Array[], places = 0, network: Uint8Array | null = null): Promise<Evaluator> {
     const { instance } = await WebAssembly.instantiate(module);
     const core = instance.exports as unknown as Core;
     core._initialize();
     const room = core.room();
     let at = room;
-    blocks.forEach((block, i) => {
+    [...blocks, ...(network ? [network] : [])].forEach((block, i) => {
       reserve(core.memory, at + block.length);
       new Uint8Array(core.memory.buffer, at).set(block);
-      const fault = i === 0 ? core.open(block.length) : core.open_field(at, block.length);
+      const further = block === network ? core.open_network : core.open_field;
+      const fault = i === 0 ? core.open(block.length) : further(at, block.length);
       if (fault !== 0) throw new Error(`The weights of this body can't be used: ${FAULTS[fault] ?? "their fault is unknown"}.`);
       at += block.length;
     });
@@ -127,6 +130,13 @@ export class Evaluator {
     }
     const [depth, , x, y, z, u, v, w] = first as unknown as number[];
     return { depth: depth!, contact: [x!, y!, z!], normal: [u!, v!, w!], numbers };
+  }
+
+  /** Outputs of the network beside the body; overwritten by each call. */
+  predict(inputs: ArrayLike<number>, outputs: number): Float64Array {
+    this.numbers(this.core.asked(), inputs.length).set(Array.from(inputs));
+    this.core.predict();
+    return this.numbers(this.core.shaped(), outputs);
   }
 
   /** How many numbers a shape has for modes and local modes of all fields. */

@@ -6,6 +6,8 @@ import { Evaluator } from "./evaluator";
 import { say } from "./flags";
 import { FileConnection } from "./file_connection";
 import { IndentationDrawing } from "./indentation_drawing";
+import { LineShape } from "./line_shape";
+import type { LineFacts } from "./line_shape";
 import type { Places } from "./indentation_drawing";
 import type { Hello } from "./messages";
 import { Binding, PackedSurface } from "./packed";
@@ -15,9 +17,10 @@ import { touch } from "./touch";
 
 interface Facts {
   places: Places | null; // where indentations stay
-  surface: SurfaceFacts;
+  surface: SurfaceFacts | null; // none of a body drawn as a line
   drawn: { surface: SurfaceFacts; binding: BindingFacts } | null; // the body's own surface, which the other carries
   fields: FieldFacts[];
+  line: LineFacts | null;
 }
 
 /** Bytes from base64. */
@@ -51,30 +54,32 @@ async function open(): Promise<void> {
   const [hello, facts] = await Promise.all([json<Hello>("hello"), json<Facts>("facts")]);
   const each = (name: string, count: number): Promise<Uint8Array<ArrayBuffer>[]> =>
     Promise.all(Array.from({ length: count }, (_, i) => part(`${name}-${i}`)));
-  const [mesh, module, blocks, modes] = await Promise.all([
-    part("surface"),
+  const [mesh, nodes, module, blocks, modes] = await Promise.all([
+    facts.surface ? part("surface") : null,
+    facts.line ? part("line") : null,
     part("core"),
     each("weights", Math.max(1, facts.fields.length)),
     each("field", facts.fields.length),
   ]);
-  const packed = new PackedSurface(facts.surface, mesh);
-  let fields = facts.fields.map((own, i) => packed.field(own, modes[i]!));
-  let { surface } = packed;
+  const packed = facts.surface && new PackedSurface(facts.surface, mesh!);
+  let fields = facts.fields.map((own, i) => packed!.field(own, modes[i]!));
+  let surface = packed?.surface;
   if (facts.drawn) {
-    const binding = new Binding(facts.drawn.binding, await part("binding"), surface);
+    const binding = new Binding(facts.drawn.binding, await part("binding"), surface!);
     fields = fields.map((field, i) => binding.carry(field, hello.fields[i]!.components));
     ({ surface } = new PackedSurface(facts.drawn.surface, await part("drawn")));
   }
-  provide({ surface: async () => surface, modes: async (field) => fields[field]! });
-  const evaluator = await Evaluator.of(module, blocks.map(words), facts.places?.points.length);
-  const kept = facts.places && new IndentationDrawing(evaluator, hello, surface, facts.places);
+  provide({ surface: async () => surface!, modes: async (field) => fields[field]! });
+  const evaluator = await Evaluator.of(module, blocks.map(words), facts.places?.points.length, nodes && words(nodes));
+  const kept = facts.places && new IndentationDrawing(evaluator, hello, surface!, facts.places);
+  const line = facts.line && new LineShape(evaluator, facts.line, hello.line!.rest.length);
   const curve = new DepthCurve(hello, evaluator);
   touch({
-    connect: (listener) => new FileConnection(listener, hello, evaluator, kept),
+    connect: (listener) => new FileConnection(listener, hello, evaluator, kept, line),
     seen: (frame) => curve.update(frame),
   });
   // for programs that drive the page, and for whoever wants to ask the body
-  Object.assign(window, { palpate: { hello, evaluator, surface, fields, kept } });
+  Object.assign(window, { palpate: { hello, evaluator, surface, fields, kept, line } });
 }
 
 document.documentElement.dataset["file"] = "";

@@ -7,6 +7,7 @@ import type { Listener } from "./connection";
 import { CONTACT, TOO_DEEP, TRUSTED } from "./evaluator";
 import type { Answer, Evaluator } from "./evaluator";
 import type { IndentationDrawing } from "./indentation_drawing";
+import type { LineShape } from "./line_shape";
 import { Hold, Loop } from "./messages";
 import type { Frame, Hand, Hello, Vec3 } from "./messages";
 
@@ -36,6 +37,7 @@ export class FileConnection {
     private readonly hello: Hello,
     private readonly evaluator: Evaluator,
     private readonly kept: IndentationDrawing | null,
+    private readonly line: LineShape | null = null,
   ) {
     this.place = [...hello.centre];
     this.parameters = Float32Array.from(hello.parameters, ({ low, high }) => (low + high) / 2);
@@ -78,7 +80,7 @@ export class FileConnection {
   /** Where the hand wants the probe's centre, or what it holds, m. */
   private wanted(target: Vec3): Vec3 {
     const [x, y, z] = target.map((v) => v * this.hello.scale) as Vec3;
-    const moved: Vec3 = [x, -z, y]; // a device's y is up, a solid's z
+    const moved: Vec3 = this.line ? [x, y, z] : [x, -z, y]; // a device's y is up, as a line's; a solid's z
     return this.hello.holds ? moved : (moved.map((v, k) => v + this.hello.centre[k]!) as Vec3);
   }
 
@@ -119,6 +121,19 @@ export class FileConnection {
     return place.map((v, k) => v + (depth - left) * normal[k]!) as Vec3;
   }
 
+  /** Displacements (3 N) of a line's nodes, m. */
+  private shape(time: number): Float32Array {
+    const { line, answer } = this;
+    if (!line) return NOTHING;
+    return answer ? line.held(this.place, answer.force, this.parameters, time) : line.free(this.parameters, time);
+  }
+
+  /** The displacement of the node that a hand holds. */
+  private nodeAt(displacement: Float32Array): Vec3 {
+    const first = 3 * this.hello.line!.touch_node;
+    return Array.from(displacement.subarray(first, first + 3)) as Vec3;
+  }
+
   private frame(time: number, held: boolean): Frame {
     const { hello, answer, evaluator } = this;
     const at = hello.holds ? null : this.drawn(time);
@@ -130,6 +145,7 @@ export class FileConnection {
       for (let i = 0; i < coefficients.length; i++) coefficients[i]! *= share;
     }
     const contact = answer !== null && (answer.flags & CONTACT) !== 0;
+    const displacement = this.shape(time);
     this.tick += 1;
     return {
       version: hello.version,
@@ -155,13 +171,13 @@ export class FileConnection {
       resting: !held,
       stalled: false,
       parameters: this.parameters,
-      contact: touched ? touched.contact : hello.holds ? hello.centre : NOWHERE,
+      contact: touched ? touched.contact : this.line ? this.nodeAt(displacement) : hello.holds ? hello.centre : NOWHERE,
       normal: touched ? touched.normal : NOWHERE,
       depth: answer ? answer.depth : 0,
       stiffness: answer && contact ? along(answer) : 0,
       deviation: contact ? evaluator.deviation(this.place, this.parameters) : 0,
       drawn: touched ? touched.depth : 0,
-      displacement: new Float32Array(),
+      displacement,
       coefficients,
       indentation: this.kept?.depths ?? NOTHING,
     };

@@ -48,9 +48,9 @@ def main() -> None:
     deepest = pictures[NOTCHES]  # the mouse is still in the middle
     deepest.save(STILL, optimize=True)
     small = [each.resize((WIDTH, WIDTH * SIZE["height"] // SIZE["width"])) for each in pictures]
-    small[0].save(
-        MOVING, save_all=True, append_images=small[1:], duration=PAUSE, loop=0, quality=70, method=6
-    )
+    moving = io.BytesIO()  # written at once: an interruption leaves the picture before
+    small[0].save(moving, "webp", save_all=True, append_images=small[1:], duration=PAUSE, loop=0, quality=70)
+    MOVING.write_bytes(moving.getvalue())
 
 
 def _press(page: Page) -> list[Image.Image]:

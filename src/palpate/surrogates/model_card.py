@@ -17,6 +17,7 @@ from typing import Any
 
 from palpate.errors import UsageError
 from palpate.format import count, millimetres
+from palpate.input_words import input_in_words
 from palpate.surrogates.card_text import bullets, escape_markdown, html_page, html_record, rows
 from palpate.units import Range
 
@@ -90,7 +91,8 @@ class ModelCard:
         """Return the card as a part of a page, as a notebook shows it."""
         answers = self.answers
         inputs = [
-            (r["name"], f"{r['low']:.6g} to {r['high']:.6g} {r['unit']}".strip()) for r in answers["inputs"]
+            (_input_label(r), f"{r['low']:.6g} to {r['high']:.6g} {r['unit']}".strip())
+            for r in answers["inputs"]
         ]
         parts = {
             "inputs": dict(inputs),
@@ -109,7 +111,7 @@ class ModelCard:
         lines += [f"- Author: {escape(self.author)}", f"- Licence: {escape(self.licence)}", ""]
         lines += ["## Inputs", "", "| input | trained from | to | unit |", "|---|--:|--:|---|"]
         lines += [
-            f"| {escape(r['name'])} | {r['low']:.6g} | {r['high']:.6g} | {escape(r['unit']) or '–'} |"
+            f"| {escape(_input_label(r))} | {r['low']:.6g} | {r['high']:.6g} | {escape(r['unit']) or '–'} |"
             for r in self.answers["inputs"]
         ]
         lines += ["", "Answers: " + "; ".join(map(escape, self.answers["outputs"])) + ".", ""]
@@ -121,6 +123,13 @@ class ModelCard:
                 lines += [f"## {title}", "", *(f"- {escape(sentence)}" for sentence in sentences), ""]
         lines += ["## Hashes (SHA-256)", "", *(f"- {name}: `{value}`" for name, value in self.hashes.items())]
         return "\n".join(lines).rstrip() + "\n"
+
+
+def _input_label(entry: Mapping[str, Any]) -> str:
+    """Return an input's words, and its name where that is a symbol."""
+    name = str(entry["name"])
+    words = input_in_words(name, str(entry["unit"]))
+    return name if words == name else f"{words} ({name})"
 
 
 def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard:

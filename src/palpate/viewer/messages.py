@@ -242,6 +242,7 @@ class RangeInfo:
     """A named interval."""
 
     name: str
+    words: str  # the name as a person reads it
     low: float
     high: float
     unit: str

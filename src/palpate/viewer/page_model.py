@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from palpate.devices.hand_kind import HandKind
+from palpate.input_words import input_in_words
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
@@ -214,4 +215,4 @@ def vector(v: np.ndarray) -> Vec3:
 
 
 def _ranges(inputs: tuple[Range, ...]) -> tuple[RangeInfo, ...]:
-    return tuple(RangeInfo(r.name, r.low, r.high, r.unit) for r in inputs)
+    return tuple(RangeInfo(r.name, input_in_words(r.name, r.unit), r.low, r.high, r.unit) for r in inputs)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from palpate.format import count, interval, length, plain, scientific, share
+from palpate.input_words import input_in_words
 from palpate.validation.figures.by_load import worse_than_filter
 from palpate.validation.figures.history_following import HistoryErrors
 from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
@@ -151,7 +152,8 @@ def _solved_by_load(chapter: Chapter) -> str:
     test = chapter.test
     train = test if chapter.train is None else chapter.train
     loads = ", ".join(
-        f"{r.name} from {r.low:g} to {r.high:g} {r.unit}".rstrip() for r in chapter.subject.ranges
+        f"{input_in_words(r.name, r.unit)} from {r.low:g} to {r.high:g} {r.unit}".rstrip()
+        for r in chapter.subject.ranges
     )
     failed = len(train) + len(test) - len(train.ok) - len(test.ok)
     text = (

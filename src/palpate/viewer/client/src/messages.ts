@@ -32,6 +32,7 @@ export const Role = {
 /** A named interval. */
 export interface RangeInfo {
   name: string;
+  words: string;
   low: number;
   high: number;
   unit: string;

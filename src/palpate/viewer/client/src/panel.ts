@@ -219,7 +219,7 @@ function whole(words: string): HTMLElement {
 /** An input and its range. */
 function trained(range: RangeInfo): HTMLElement {
   const words = whole("");
-  words.append(...printed(range.name), ` ${interval(range.low, range.high, range.unit)}`);
+  words.append(...printed(range.words), ` ${interval(range.low, range.high, range.unit)}`);
   return words;
 }
 
@@ -255,7 +255,7 @@ function sliders(parameters: RangeInfo[], moved: (i: number, value: number) => v
       const { size, unit } = rangeUnit(range.low, range.high, range.unit);
       [slider.dataset["size"], slider.dataset["unit"]] = [String(size), unit];
       slider.addEventListener("input", () => moved(i, slider.valueAsNumber));
-      name!.append(...printed(range.name));
+      name!.append(...printed(range.words));
       label!.append(name!, value!, slider);
       return label!;
     }),

@@ -17,6 +17,7 @@ from palpate.input_words import input_in_words
         ("c_y_2", "m", "ball's centre along y"),
         ("P", "N", "force P"),
         ("P_y", "N", "force P_y"),
+        ("h", "m", "displacement"),
         ("h along P", "m", "displacement along the force P"),
         ("h along tip load", "m", "displacement along the tip load"),
         ("probe.radius", "m", "radius of the probe"),

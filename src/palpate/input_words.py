@@ -28,6 +28,8 @@ def input_in_words(name: str, unit: str = "") -> str:
     str
         For example ``"pad's place along x"``.
     """
+    if name == "h":
+        return "displacement"
     if place := _PLACE.fullmatch(name):
         words = _MOVING[place["symbol"]].format(place["axis"])
         return f"{words} ({place['owner']})" if place["owner"] else words

@@ -6,7 +6,7 @@ import type { Layout } from "./wire";
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 6;
+export const PROTOCOL = 7;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -93,6 +93,7 @@ export interface Hello {
   centre: Vec3;
   line: Line | null;
   fields: FieldInfo[];
+  pad: string;
   remembers: string;
   scale: number;
   workspace: number;

@@ -393,7 +393,11 @@ class PartOptions(Options):
         None, "radius of the ball. Default: by the part's size", "m", above=0, bare=False
     )
     depth: float | None = option(
-        None, "largest depth of the ball. Default: half its radius", "m", above=0, bare=False
+        None,
+        "largest depth of the ball. Default: its radius, at most a quarter of the thickness beneath",
+        "m",
+        above=0,
+        bare=False,
     )
     held: tuple[str, ...] = option(
         (), "surface of the file that is held. Several times. Default: what it stands on"

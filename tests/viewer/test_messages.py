@@ -67,6 +67,7 @@ HELLO = Hello(
     centre=(0.0, 0.0, 0.0),
     line=LINE,
     fields=(),
+    pad="",
     remembers="",
     scale=11.7,
     workspace=0.075,

@@ -16,8 +16,9 @@ from palpate.errors import PalpateError, UsageError
 from palpate.file_kinds import PART_FORMATS, part_ending, part_kind, way_for
 from palpate.options import PartOptions, takes
 from palpate.physics.shapes.cad_file import states_unit
-from palpate.physics.shapes.mesh import Face
+from palpate.physics.shapes.mesh import BodyMesh, Face
 from palpate.record_complaints import complaints
+from palpate.study.interaction_records import ProbeRecord
 from palpate.study.part_records import PartRecord, part_shape
 from palpate.study.study import Study
 from palpate.study.toml import to_toml
@@ -31,9 +32,14 @@ SMALL = 5e-3  # m: a part that would be smaller in mm may have been drawn in m
 FLAT, LEVEL = 0.999, 0.02
 FOOT = 0.05  # share of the box's footprint that a face has at least to stand on
 HOLD = 0.12  # share of the height that is held where no flat face is below
-RADIUS, DEPTH = 0.18, 0.5  # radius of the probe over the least extent, and its depth over the radius
+RADIUS = 0.18  # radius of the probe over the least extent
+# A press has to be seen, so it goes as deep as the ball's radius; the pad takes about a quarter of that. Deeper than a
+# quarter of what lies beneath, the support is felt rather than the part, and elements are crushed before they converge.
+DEPTH, BENEATH = 1.0, 0.25  # depth over the radius, and over the part's thickness beneath the ball, at most
 LARGEST = 0.3  # radius over the least extent, for a large surface, at most
 CELLS = 300  # squares of an element's length on the footprint: about 15,000 unknowns, seconds a solve
+PLACES = 64  # at which the thickness beneath is measured
+NEAR = 1e-6  # of a triangle's size: nearer, a way meets the triangle that it begins at
 COARSE = 0.5  # element over the radius: coarser ones do not feel the ball
 LEAST_DEPTH = 1 / 25  # least depth over the largest
 MARGIN = 3.0  # distance of places from the rim of the touched surface's box, in radii
@@ -47,7 +53,8 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     """Return a study of a part, and what its file holds as lines of text.
 
     The part is held at its flat face below, or where it has none at the lowest eighth of its height; it is pressed
-    where it faces up. Probe and depth follow from its least extent, the material is neo-Hookean.
+    where it faces up. The probe follows from its least extent; it goes as deep as its radius, and no deeper than a
+    quarter of the part's thickness beneath. The material is neo-Hookean.
 
     The `unit` is mm by default, or m where mm can't be; between 1 and 5 in numbers it has to be said.
     """
@@ -92,6 +99,8 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     }
     study = _study_of(content) if touched else _with_touched(content, named)
     study = _suit(study, content, element)
+    if options.depth is None:
+        study = _suit_depth(study)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
 
@@ -139,6 +148,46 @@ def _suit(study: Study, content: dict[str, Any], element: float) -> Study:
         return study
     body = study.body.model_dump()
     return _study_of(content | changes | {"body": body})
+
+
+def _suit_depth(study: Study) -> Study:
+    """Return the study with no more depth than the part has room for beneath three quarters of what is touched."""
+    acting, body = study.interaction, study.body
+    assert isinstance(body, PartRecord)
+    assert isinstance(acting, ProbeRecord)
+    most = BENEATH * float(np.quantile(_thickness(body.shape().skin, acting.touches), 0.25))
+    if most >= acting.depth[1]:
+        return study
+    deepest = _nice(most)
+    depth = (_nice(LEAST_DEPTH * deepest), deepest)
+    return study.model_copy(update={"interaction": acting.model_copy(update={"depth": depth})})
+
+
+def _thickness(skin: BodyMesh, surface: str) -> np.ndarray:
+    """Return how far it is (n,), in m, from places all over a surface straight through the part to its other side.
+
+    Each place stands for an equal part of the area. The way begins at a triangle's middle, against its normal, and ends
+    at the first triangle that it meets.
+    """
+    corners, on = skin.points[skin.triangles], skin.on(surface)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(across, axis=1)
+    own = np.flatnonzero(on)
+    total = np.cumsum(area[own])
+    own = own[np.searchsorted(total, total[-1] * (np.arange(PLACES) + 0.5) / PLACES)]
+    a, edges = corners[:, 0], (corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    ways = np.empty(PLACES)
+    for i, t in enumerate(own):  # Möller & Trumbore 1997
+        inward = -across[t] / area[t]
+        offset, side = corners[t].mean(axis=0) - a, np.cross(inward, edges[1])
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # triangles along the way
+            turn = 1.0 / np.einsum("ti,ti->t", side, edges[0])
+            other = np.cross(offset, edges[0])
+            u, v = turn * np.einsum("ti,ti->t", side, offset), turn * (other @ inward)
+            way = turn * np.einsum("ti,ti->t", other, edges[1])
+            met = (u >= 0) & (v >= 0) & (u + v <= 1) & (way > NEAR * np.sqrt(area[t]))
+        ways[i] = way[met].min(initial=np.inf)
+    return ways
 
 
 def part_text(study: Study, notes: Iterable[str]) -> str:
@@ -267,6 +316,7 @@ def _notes(
     yield ""
     yield f"The part {path.name}{taken}: {size} mm, from {_millimetres(low)} to {_millimetres(high)}."
     yield f"Regions: {', '.join(regions)}."
+    yield "Left to palpate, the ball goes as deep as its radius, at most a quarter of the thickness beneath."
     yield "Surfaces of the file; [[body.surfaces]] gives names to other parts of the surface:"
     ordered = sorted(faces, key=lambda face: -face.area)
     for face in ordered[:LISTED]:

@@ -19,6 +19,7 @@ from palpate.errors import UsageError
 from palpate.format import count, millimetres
 from palpate.input_words import input_in_words
 from palpate.surrogates.card_text import bullets, escape_markdown, html_page, html_record, rows
+from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.units import Range
 
 __all__ = ["FORMAT_VERSION", "NOT_STATED", "ModelCard", "card_of"]
@@ -251,6 +252,8 @@ def _limits_of(body: Any, meta: Mapping[str, Any]) -> list[str]:
         "The answers hold between the trained ends of every input; elsewhere they are continued and marked.",
         *_depths_of(body.energy),
     ]
+    if (part := pad_part_of(body.energy, meta)) is not None:
+        limits.append(str(part))
     known = "say" if body.energy.root is not None else "do not say"
     limits.append(f"The answers {known} how far the force may be off from place to place.")
     remembers = "Elastic: a force depends on the place alone, not on what came before."

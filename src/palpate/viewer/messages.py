@@ -290,6 +290,7 @@ class Hello(Json):
     centre: Vec3  # (3,) the device's centre in the body's coordinates, m
     line: Line | None  # set where the body is drawn as a line, and not as a surface
     fields: tuple[FieldInfo, ...]  # to colour by; the first moves the surface where it has three components
+    pad: str  # what the probe's pad takes of depth and force, in words; empty where there is none
     remembers: str  # how the force relaxes, or indentations stay, in words; empty where neither does
     scale: float  # body metres per metre of hand
     workspace: float  # radius of the hand's workspace, m

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,6 +19,7 @@ from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import NodeField
+from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.units import Range, bounds
 from palpate.viewer.about_record import about_record
 from palpate.viewer.indentation_drawing import yielding_in_words
@@ -86,6 +88,12 @@ class PageModel:
         """Number of the fields on the surface."""
         return len(self._drawing.infos)
 
+    @cached_property
+    def pad_words(self) -> str:
+        """What the pad takes of a press, in words; empty where there is no pad."""
+        part = pad_part_of(self.body.energy, self.body.meta)
+        return "" if part is None else str(part)
+
     def modes(self, index: int) -> Modes:
         """Return what the page needs to sum up field `index` of the surface."""
         return self.drawing.modes(index)
@@ -117,6 +125,7 @@ class PageModel:
             centre=vector(self.centre),
             line=self._drawing.line if isinstance(self._drawing, LineDrawing) else None,
             fields=self._drawing.infos,
+            pad=self.pad_words,
             remembers="" if body.line is not None else yielding_in_words(body) or str(body.memory or ""),
             scale=state.scale,
             workspace=state.radius,

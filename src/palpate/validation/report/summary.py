@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from palpate.format import count, interval, length, plain, scientific, share
 from palpate.input_words import input_in_words
+from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.validation.figures.by_load import worse_than_filter
 from palpate.validation.figures.history_following import HistoryErrors
 from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
@@ -115,6 +116,10 @@ def _facts(chapter: Chapter) -> Iterator[Fact]:
     if errors is not None:
         largest = errors.largest_force if v.histories else errors.largest
         yield Fact(f"{plain(largest, 3)} N", "largest force on the hand in the test")
+    energy = getattr(chapter.model, "energy", None)
+    part = None if energy is None else pad_part_of(energy, chapter.meta)
+    if part is not None:
+        yield Fact(share(part.depth_share), str(part))
     if v.networks is not None:
         refined = v.networks.refined
         outputs = len(refined.per_output)

@@ -94,6 +94,7 @@ export interface Hello {
   centre: Vec3;
   line: Line | null;
   fields: FieldInfo[];
+  pad: string;
   remembers: string;
   scale: number;
   workspace: number;

@@ -73,6 +73,7 @@ export class Panel {
   }
 
   private describe(hello: Hello): void {
+    element("pad-words").textContent = hello.pad;
     about(hello, [
       [hello.holds ? "largest trained displacement" : "deepest trained press", measured(hello.deepest, "m")],
       ["largest trained force", `${tidy(hello.force_max)} N`],

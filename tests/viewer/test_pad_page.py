@@ -19,6 +19,11 @@ def test_a_pad_is_pulled_with_the_force_of_its_energy(browser: Browser, keep):
         page = open_page(browser, viewer, complaints)
         settled(page, "free")
         keep(page, "pad-rest")
+        told = page.inner_text("#model-line") + page.inner_text("#sliders")
+        assert "pad moved along x" in told
+        assert "pad's place along" in told
+        assert "_" not in told
+        assert page.inner_text("#legend-title") == "displacement (mm)"
         page.locator("#parameter-0").fill("0.01")
         page.wait_for_selector('html[data-parameters^="0.00999"]')  # in 32 bits
         x, y = tip(page)

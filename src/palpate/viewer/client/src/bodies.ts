@@ -236,6 +236,7 @@ class PadBody implements Body {
     this.surface = await parts().surface(this.hello.version);
     this.view = new PadView(this.canvas, this.surface, this.hello, WORDS.map(element));
     this.hand.attach(this.view);
+    legend({ name: "displacement", unit: "m", low: 0, high: this.hello.deepest, components: 3, modes: 0 });
   }
 
   show(frame: Frame): void {
@@ -243,7 +244,7 @@ class PadBody implements Body {
   }
 
   notes(): string[] {
-    return ["the face around the pad is drawn at rest", `grid ${measured(this.view!.cell, "m")}`];
+    return ["the tissue follows the pad as a half-space follows a rigid disc", `grid ${measured(this.view!.cell, "m")}`];
   }
 
   place(): void {

@@ -121,7 +121,12 @@ export class PadView extends SurfaceView {
   private readonly pad: Mesh<CylinderGeometry, MeshLambertMaterial>;
   private readonly place = new Vector3(); // at rest
 
-  constructor(canvas: HTMLCanvasElement, surface: Surface, hello: Hello, words: readonly Element[]) {
+  constructor(
+    canvas: HTMLCanvasElement,
+    surface: Surface,
+    private readonly hello: Hello,
+    words: readonly Element[],
+  ) {
     super(canvas, surface, words);
     const { radius } = hello;
     this.arrow = new Arrow(LONG * this.across(), Math.max(hello.force_max, 1e-9), 0.4 * radius);
@@ -134,13 +139,29 @@ export class PadView extends SurfaceView {
     this.recolour();
   }
 
-  /** Take over one picture: where the pad is, and its force. */
-  hold(frame: Frame, shares: ArrayLike<number>): void {
-    this.deform(new Float32Array(this.surface.rest.length), 1, shares, null, { ghost: false, mesh: false });
+  /** Take over one picture: where the pad is, its force, and the tissue around it; `shares` gets the colours' shares. */
+  hold(frame: Frame, shares: Float32Array): void {
     this.place.set(...frame.contact);
     this.grip.set(...frame.position).add(this.place);
+    this.deform(this.follow(frame, shares), 1, shares, null, { ghost: false, mesh: false });
     this.pad.position.copy(this.grip);
     this.arrow.update(this.grip, frame.grabbed ? frame.force : [0, 0, 0]);
+  }
+
+  /** Displacements of the tissue: that of the pad beneath it, (2/π) asin(a/r) of it around, as of a half-space under a rigid disc. */
+  private follow({ position, normal }: Frame, shares: Float32Array): Float32Array {
+    const { rest } = this.surface;
+    const [moved, size] = [new Float32Array(rest.length), Math.hypot(...position) / this.hello.deepest];
+    const [across, up] = [new Vector3(), new Vector3(...normal)];
+    for (let i = 0; i < shares.length; i++) {
+      across.fromArray(rest, 3 * i).sub(this.place);
+      const depth = across.dot(up); // below the face, the closer to the pad the more it follows
+      const far = Math.hypot(across.addScaledVector(up, -depth).length(), depth);
+      const part = far > this.hello.radius ? (2 / Math.PI) * Math.asin(this.hello.radius / far) : 1;
+      shares[i] = part * size;
+      for (let k = 0; k < 3; k++) moved[3 * i + k] = part * position[k]!;
+    }
+    return moved;
   }
 
   /** The offset (m) of the pad from rest under a canvas point, in the plane through it that faces the camera. */

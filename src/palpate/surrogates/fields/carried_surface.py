@@ -16,7 +16,6 @@ from functools import cached_property
 from typing import Annotated
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from palpate.checks import own_arrays
 from palpate.surrogates.fields.surface_interpolation import node_normals
@@ -76,6 +75,9 @@ class CarriedSurface:
         cls, points: np.ndarray, triangles: np.ndarray, nodes: np.ndarray, cells: np.ndarray
     ) -> CarriedSurface:
         """Bind vertices (p, 3) of triangles (t, 3) to triangles (c, 6) of nodes (n, 3) at rest; lengths in m."""
+        # not at the top: the real-time process loads this file without SciPy
+        from scipy.spatial import cKDTree
+
         corners, facing = nodes[cells[:, :3]], node_normals(points, triangles)
         grid = _grid()
         tree, steps = cKDTree(np.einsum("gk,cki->cgi", grid, corners).reshape(-1, 3)), len(grid)

@@ -8,23 +8,24 @@ from palpate.input_words import input_in_words
 
 
 @pytest.mark.parametrize(
-    ("name", "unit", "words"),
+    ("name", "words"),
     [
-        ("p_x", "m", "pad's place along x"),
-        ("d_z", "m", "pad moved along z"),
-        ("finger d_z", "m", "pad moved along z (finger)"),
-        ("c_y", "m", "ball's centre along y"),
-        ("c_y_2", "m", "ball's centre along y"),
-        ("P", "N", "force P"),
-        ("P_y", "N", "force P_y"),
-        ("h", "m", "displacement"),
-        ("h along P", "m", "displacement along the force P"),
-        ("h along tip load", "m", "displacement along the tip load"),
-        ("probe.radius", "m", "radius of the probe"),
-        ("skin.young", "Pa", "Young's modulus of the skin"),
-        ("firmness", "", "firmness"),
-        ("tip load", "N", "tip load"),
+        ("p_x", "pad's place along x"),
+        ("d_z", "pad moved along z"),
+        ("finger d_z", "pad moved along z (finger)"),
+        ("c_y_2", "ball's centre along y"),
+        ("P", "force"),
+        ("P_y", "force along y"),
+        ("P_0.4m", "force at 0.4\N{NO-BREAK SPACE}m"),
+        ("P_max", "largest force so far"),
+        ("h", "displacement"),
+        ("h along P", "displacement along the force"),
+        ("h along tip load", "displacement along the tip load"),
+        ("probe.radius", "radius of the ball"),
+        ("skin.young", "Young's modulus of skin"),
+        ("firmness", "firmness"),
+        ("tip load", "tip load"),
     ],
 )
-def test_a_symbol_has_words_and_words_stay(name, unit, words):
-    assert input_in_words(name, unit) == words
+def test_a_symbol_has_words_and_words_stay(name, words):
+    assert input_in_words(name) == words

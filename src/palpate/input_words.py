@@ -6,36 +6,42 @@ import re
 
 __all__ = ["input_in_words"]
 
-_PLACE = re.compile(r"(?:(?P<owner>.+) )?(?P<symbol>[cdp])_(?P<axis>[xyz])(?:_\d+)?")
-# what moves along an axis, by the symbol of its coordinate
-_MOVING = {"c": "ball's centre along {}", "d": "pad moved along {}", "p": "pad's place along {}"}
+_WORDS = (
+    (r"c_([xyz])(_\d+)?", r"ball's centre along \1"),
+    (r"d_([xyz])(_\d+)?", r"pad moved along \1"),
+    (r"p_([xyz])(_\d+)?", r"pad's place along \1"),
+    (r"P", "force"),
+    (r"P_([xyz])", r"force along \1"),
+    (r"P_([\d.]+)m", "force at \\1\N{NO-BREAK SPACE}m"),
+    (r"P_max", "largest force so far"),
+    (r"P_held", "time for which the force was held"),
+    (r"[hw]", "displacement"),
+    (r"probe\.radius", "radius of the ball"),
+    (r"(.+)\.young", r"Young's modulus of \1"),
+    (r"(.+)\.poisson", r"Poisson's ratio of \1"),
+    (r"(.+)\.thickness", r"thickness of \1"),
+)
+"""Patterns of the names that palpate gives by itself, and their words."""
 _ALONG = "h along "  # displacement of what is held, in the direction of a load
-_PROPERTIES = {"young": "Young's modulus", "poisson": "Poisson's ratio"}
 
 
-def input_in_words(name: str, unit: str = "") -> str:
+def input_in_words(name: str) -> str:
     """Return an input in words that a person reads; a name that is no symbol is its own words.
 
     Parameters
     ----------
     name : str
         Name of the input, such as ``"p_x"``, ``"h along P"``, ``"probe.radius"`` or ``"tip load"``.
-    unit : str
-        SI unit of the input.
 
     Returns
     -------
     str
         For example ``"pad's place along x"``.
     """
-    if name == "h":
-        return "displacement"
-    if place := _PLACE.fullmatch(name):
-        words = _MOVING[place["symbol"]].format(place["axis"])
-        return f"{words} ({place['owner']})" if place["owner"] else words
     if name.startswith(_ALONG):
-        return f"displacement along the {input_in_words(name.removeprefix(_ALONG), 'N')}"
-    if "." in name:
-        owner, _, quantity = name.rpartition(".")
-        return f"{_PROPERTIES.get(quantity, quantity)} of the {owner.replace('.', ' ')}"
-    return f"force {name}" if unit == "N" and len(name.partition("_")[0]) == 1 else name
+        return f"displacement along the {input_in_words(name.removeprefix(_ALONG))}"
+    owner, _, own = name.rpartition(" ")  # of several pads each has its name before its inputs
+    for pattern, words in _WORDS:
+        if match := re.fullmatch(pattern, own):
+            return match.expand(words) + (f" ({owner})" if owner else "")
+    return name

@@ -249,15 +249,19 @@ def test_a_study_for_a_part_says_what_its_file_holds(folder):
 
 
 @pytest.mark.parametrize(("height", "depth"), [(20, None), (4, 1e-3), (2.4, 6e-4)])
-def test_a_ball_goes_as_deep_as_its_radius_and_the_thickness_beneath_allow(height, depth, tmp_path):
-    """A plate of 60 × 60 mm is as thick everywhere; a quarter of it is less than the radius where the plate is thin."""
+def test_a_ball_goes_as_deep_as_three_quarters_of_its_radius_and_the_thickness_beneath_allow(
+    height, depth, tmp_path
+):
+    """A plate of 60 × 60 mm is as thick everywhere; a quarter of it is less than that where the plate is thin."""
     path = tmp_path / "plate.stl"
     trimesh.creation.box((60, 60, height)).export(path)
     choices = {"unit": "mm", "radius": 0.004}
     study, notes = part_study(path, **choices)
-    assert study.interaction.depth[1] == pytest.approx(0.004 if depth is None else depth)
+    assert study.interaction.depth[1] == pytest.approx(0.003 if depth is None else depth)
     assert study.interaction.depth[0] <= study.interaction.depth[1] / 25
-    assert "as deep as its radius, at most a quarter of the thickness beneath" in to_toml(study, notes)
+    assert "three quarters of its radius deep, at most a quarter of what lies beneath" in to_toml(
+        study, notes
+    )
     assert part_study(path, depth=2e-3, **choices)[0].interaction.depth[1] == 2e-3, "as it is asked"
 
 

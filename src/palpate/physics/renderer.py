@@ -165,7 +165,7 @@ def plot_solution(
         canvas.stroke(deformed.circles(*sphere, towards), BALL, 1.1, hidden=0.25)
     rim, outward = deformed.rim(body, deformed.fixed_of(solution) if fixed is None else fixed)
     canvas.mark_fixed(deformed.cut_lines(moved, heights, rim), outward)
-    canvas.furnish(scale)
+    canvas.furnish(scale if np.any(body.displacement) else 1.0)  # at rest nothing is exaggerated
     if field is not None:
         canvas.add_colour_bar(field, (low, high))
     picture = Picture(canvas.figure)

@@ -33,9 +33,10 @@ FLAT, LEVEL = 0.999, 0.02
 FOOT = 0.05  # share of the box's footprint that a face has at least to stand on
 HOLD = 0.12  # share of the height that is held where no flat face is below
 RADIUS = 0.18  # radius of the probe over the least extent
-# A press has to be seen, so it goes as deep as the ball's radius; the pad takes about a quarter of that. Deeper than a
-# quarter of what lies beneath, the support is felt rather than the part, and elements are crushed before they converge.
-DEPTH, BENEATH = 1.0, 0.25  # depth over the radius, and over the part's thickness beneath the ball, at most
+# A press has to be seen, so it goes three quarters of the ball's radius deep; the pad takes about a quarter of that.
+# Deeper than a quarter of what lies beneath, the support is felt rather than the part, and elements are crushed before
+# they converge.
+DEPTH, BENEATH = 0.75, 0.25  # depth over the radius, and over the part's thickness beneath the ball, at most
 LARGEST = 0.3  # radius over the least extent, for a large surface, at most
 CELLS = 300  # squares of an element's length on the footprint: about 15,000 unknowns, seconds a solve
 PLACES = 64  # at which the thickness beneath is measured
@@ -53,8 +54,8 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     """Return a study of a part, and what its file holds as lines of text.
 
     The part is held at its flat face below, or where it has none at the lowest eighth of its height; it is pressed
-    where it faces up. The probe follows from its least extent; it goes as deep as its radius, and no deeper than a
-    quarter of the part's thickness beneath. The material is neo-Hookean.
+    where it faces up. The probe follows from its least extent; it goes three quarters of its radius deep, and no deeper
+    than a quarter of the part's thickness beneath. The material is neo-Hookean.
 
     The `unit` is mm by default, or m where mm can't be; between 1 and 5 in numbers it has to be said.
     """
@@ -316,7 +317,7 @@ def _notes(
     yield ""
     yield f"The part {path.name}{taken}: {size} mm, from {_millimetres(low)} to {_millimetres(high)}."
     yield f"Regions: {', '.join(regions)}."
-    yield "Left to palpate, the ball goes as deep as its radius, at most a quarter of the thickness beneath."
+    yield "Left to palpate, the ball goes three quarters of its radius deep, at most a quarter of what lies beneath."
     yield "Surfaces of the file; [[body.surfaces]] gives names to other parts of the surface:"
     ordered = sorted(faces, key=lambda face: -face.area)
     for face in ordered[:LISTED]:

@@ -129,7 +129,7 @@ class ModelCard:
 def _input_label(entry: Mapping[str, Any]) -> str:
     """Return an input's words, and its name where that is a symbol."""
     name = str(entry["name"])
-    words = input_in_words(name, str(entry["unit"]))
+    words = input_in_words(name)
     return name if words == name else f"{words} ({name})"
 
 

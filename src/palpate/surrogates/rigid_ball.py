@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.format import millimetres, plain, share
+from palpate.format import length, plain, share
 from palpate.surrogates.energy import LearntEnergy
 
 __all__ = ["PadPart", "pad_part", "pad_part_of"]
@@ -50,7 +50,7 @@ class PadPart:
 
     def __str__(self) -> str:
         return (
-            f"At {millimetres(self.depth)} the pad takes about {share(self.depth_share)} of the depth; "
+            f"At a depth of {length(self.depth)} the pad takes about {share(self.depth_share)} of the depth; "
             f"a rigid ball would feel about {plain(self.rigid_force)} N instead of {plain(self.force)} N."
         )
 

@@ -224,4 +224,4 @@ def vector(v: np.ndarray) -> Vec3:
 
 
 def _ranges(inputs: tuple[Range, ...]) -> tuple[RangeInfo, ...]:
-    return tuple(RangeInfo(r.name, input_in_words(r.name, r.unit), r.low, r.high, r.unit) for r in inputs)
+    return tuple(RangeInfo(r.name, input_in_words(r.name), r.low, r.high, r.unit) for r in inputs)

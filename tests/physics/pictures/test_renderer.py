@@ -10,6 +10,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from drawn import Made, bent
+from matplotlib.text import Text
 
 from palpate.errors import UsageError
 from palpate.physics.deformed import (
@@ -166,6 +167,13 @@ def test_a_picture_is_saved_where_asked(made: Made, tmp_path: Path):
         picture.save(tmp_path / "three.xyz")
     with pytest.raises(UsageError, match="no display"):
         picture.show()
+
+
+@pytest.mark.parametrize(("scale", "moved", "says"), [(2.0, 1.0, True), (2.0, 0.0, False), (1.0, 1.0, False)])
+def test_a_picture_says_that_it_exaggerates_where_it_does(made: Made, scale: float, moved: float, says: bool):
+    solution = made.with_(displacement=moved * made.displacement)
+    texts = plot_solution(solution, None, scale=scale, size=(300, 200)).figure.findobj(Text)
+    assert any("displacement drawn × 2" in text.get_text() for text in texts) is says
 
 
 def test_what_cannot_be_drawn_is_said(made: Made):

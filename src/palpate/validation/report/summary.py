@@ -157,7 +157,7 @@ def _solved_by_load(chapter: Chapter) -> str:
     test = chapter.test
     train = test if chapter.train is None else chapter.train
     loads = ", ".join(
-        f"{input_in_words(r.name, r.unit)} from {r.low:g} to {r.high:g} {r.unit}".rstrip()
+        f"{input_in_words(r.name)} from {r.low:g} to {r.high:g} {r.unit}".rstrip()
         for r in chapter.subject.ranges
     )
     failed = len(train) + len(test) - len(train.ok) - len(test.ok)

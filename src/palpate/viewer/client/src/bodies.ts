@@ -59,6 +59,7 @@ class LineBody implements Body {
     this.view = new LineView(this.canvas, this.hello, WORDS.map(element));
     this.hand.attach(this.view);
     element("true-scale").hidden = this.view.enlargement === 1;
+    element("true-scale").setAttribute("aria-pressed", "false"); // a body of before may have been shown to scale
   }
 
   show(frame: Frame): void {

@@ -7,7 +7,7 @@ import type { Flag, Places } from "./flags";
 import { Hold, Loop } from "./messages";
 import type { Frame, Hello, RangeInfo } from "./messages";
 import { Plot } from "./plot";
-import { element, fixed, input, interval, measured, printed, rangeUnit, round125, share, tidy, worded } from "./units";
+import { element, fixed, input, interval, measured, rangeUnit, round125, share, tidy, worded } from "./units";
 
 const EVERY = 80; // ms between changes of the numbers: faster can't be read
 const AT_FIRST = 0.5; // of the deepest trained depth, how deep a press goes
@@ -196,7 +196,7 @@ class Timing {
 function subtitle(hello: Hello): (Node | string)[] {
   const probe = [`probe of radius ${measured(hello.radius, "m")}`, `trained to ${measured(hello.deepest, "m")} deep`];
   const ranges = hello.holds ? hello.inputs : hello.parameters;
-  const parts = [...(hello.holds ? [] : probe.map(whole)), ...ranges.map(trained)];
+  const parts = [...(hello.holds ? [] : probe.map(whole)), ...trained(ranges)];
   const joined = parts.flatMap((part, i) => (i === 0 ? [part] : [", ", part]));
   return hello.holds ? ["trained on ", ...joined] : joined;
 }
@@ -217,11 +217,20 @@ function whole(words: string): HTMLElement {
   return span;
 }
 
-/** An input and its range. */
-function trained(range: RangeInfo): HTMLElement {
-  const words = whole("");
-  words.append(...printed(range.words), ` ${interval(range.low, range.high, range.unit)}`);
-  return words;
+/** Inputs and their ranges; those that differ in their axis alone stand together. */
+function trained(ranges: readonly RangeInfo[]): HTMLElement[] {
+  const groups = new Map<string, string[]>();
+  for (const { words, low, high, unit } of ranges) {
+    const [, stem, axis] = /^(.* along )([xyz])$/.exec(words) ?? ["", words, ""];
+    const key = `${stem}\t${interval(low, high, unit)}`;
+    groups.set(key, [...(groups.get(key) ?? []), axis!]);
+  }
+  return [...groups].map(([key, axes]) => {
+    const [stem, between] = key.split("\t");
+    const words = worded("span", `${stem}${axes.join(", ")} `);
+    words.append(whole(between!));
+    return words;
+  });
 }
 
 /** The deviation of the force, in words. */
@@ -256,7 +265,7 @@ function sliders(parameters: RangeInfo[], moved: (i: number, value: number) => v
       const { size, unit } = rangeUnit(range.low, range.high, range.unit);
       [slider.dataset["size"], slider.dataset["unit"]] = [String(size), unit];
       slider.addEventListener("input", () => moved(i, slider.valueAsNumber));
-      name!.append(...printed(range.words));
+      name!.append(range.words);
       label!.append(name!, value!, slider);
       return label!;
     }),

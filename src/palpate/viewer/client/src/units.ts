@@ -51,15 +51,6 @@ export function share(x: number): string {
   return `${tidy(100 * x, 2)}\u00a0%`;
 }
 
-/** A name as it is printed: what follows its underscore stands lower. */
-export function printed(name: string): Node[] {
-  const [stem, ...rest] = name.split("_");
-  if (stem === undefined || stem.length > 2 || rest.length !== 1) return [document.createTextNode(name)];
-  const below = document.createElement("sub");
-  below.textContent = rest[0]!.replace(/([\d.]+)m$/, "$1\u00a0m");
-  return [document.createTextNode(stem), below];
-}
-
 function minus(words: string): string {
   return words.replaceAll("-", "−");
 }

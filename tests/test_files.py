@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from palpate import files
-from palpate.cli.app import main
+from palpate.cli.program import main
 from palpate.dataset import Dataset, Layout, assemble
 from palpate.errors import ResourceError, UsageError
 from palpate.files import TemporaryFolder, system_errors, write_file, writing, writing_folder

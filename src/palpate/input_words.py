@@ -26,17 +26,9 @@ _ALONG = "h along "  # displacement of what is held, in the direction of a load
 
 
 def input_in_words(name: str) -> str:
-    """Return an input in words that a person reads; a name that is no symbol is its own words.
+    """Return an input in words that a person reads, such as "pad's place along x" for ``p_x``.
 
-    Parameters
-    ----------
-    name : str
-        Name of the input, such as ``"p_x"``, ``"h along P"``, ``"probe.radius"`` or ``"tip load"``.
-
-    Returns
-    -------
-    str
-        For example ``"pad's place along x"``.
+    A name that is no symbol is its own words.
     """
     if name.startswith(_ALONG):
         return f"displacement along the {input_in_words(name.removeprefix(_ALONG))}"

@@ -146,7 +146,7 @@ def test_a_missed_target_is_exit_code_one_after_the_report_is_written(palpate, c
     assert answer.code == 1
     assert json.loads(answer.out)["passed"] is False
     assert (copy / "small.html").exists()
-    assert "RMSE" in answer.err
+    assert "misses 1 of 10 limits" in answer.err
 
 
 @pytest.mark.full

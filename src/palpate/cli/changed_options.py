@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.errors import UsageError
-from palpate.format import millimetres, pressure
 from palpate.options import PartOptions, declarations
 
 if TYPE_CHECKING:
@@ -73,6 +72,8 @@ def _flag(name: str) -> str:
 
 def _words(name: str, value: Any) -> str:
     """Return the value of an option in words, with its unit."""
+    from palpate.format import millimetres, pressure
+
     unit = declarations(PartOptions)[name].unit
     if unit in {"m", "Pa"}:
         return millimetres(value) if unit == "m" else pressure(value)

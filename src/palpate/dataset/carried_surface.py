@@ -56,24 +56,13 @@ def quartered(cells: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class CarriedSurface:
-    """A surface whose vertices are bound to triangles of six nodes.
+    """A surface whose vertices are bound to triangles of six nodes."""
 
-    Attributes
-    ----------
-    points : (p, 3)
-        Its vertices at rest, m.
-    triangles : (t, 3) int
-        Of these, counter-clockwise as seen from outside.
-    cells : (p,) int
-        The triangle of six nodes that carries each vertex, counted along a field's triangles, four for each.
-    weights : (p, 3)
-        Barycentric coordinates in it, not negative; they add up to one.
-    """
-
-    points: np.ndarray
-    triangles: Annotated[np.ndarray, np.int64]
+    points: np.ndarray  # (p, 3), its vertices at rest, m
+    triangles: Annotated[np.ndarray, np.int64]  # (t, 3) of these, counter-clockwise as seen from outside
+    # (p,), the triangle of six nodes that carries each vertex, counted along a field's triangles, four for each
     cells: Annotated[np.ndarray, np.int64]
-    weights: np.ndarray
+    weights: np.ndarray  # (p, 3), barycentric coordinates in it, not negative; they add up to one
 
     def __post_init__(self) -> None:
         own_arrays(self, "points", "weights")

@@ -18,8 +18,7 @@ e_min, e'_min, ε_min   a rung of a ladder from few units to many, chosen by tri
 The last three can't be read off the data: a threshold far below what the filter reaches makes it grow for its
 own transient, and the network gets worse, not better. So the filter is run on four fifths of the data, rung by
 rung, judged on the last fifth, and stops at the first rung that meets the target, or where two rungs in a row
-were no better than one before. A rung is judged after two passes.
-The rungs do not depend on the target. A tighter target can therefore only lead
+were no better than one before. The rungs do not depend on the target. A tighter target can therefore only lead
 to the same rung or a better one.
 """
 
@@ -58,8 +57,6 @@ UNITS_MAX = 60
 
 _FEWEST = 20  # samples from which a fifth of them can judge
 _MARGIN = 0.5  # of the target: runs on other samples, in another order, differ by about a factor of two
-_TRIAL_PASSES = 2  # of a rung: growth is over after a third of the first, and the rungs' order stays
-_ITERATIONS = 3  # of an observation's linearisation: further ones hardly move it
 _LARGEST = 1000  # unknowns of a full covariance
 
 
@@ -404,7 +401,6 @@ def _base(N: int, n: int, m: int, noisy: bool) -> Settings:
         window=int(np.clip(N // 2, 5, 50)),
         prune_after=2 * N,
         units_max=units,
-        iterations=_ITERATIONS,
     )
 
 
@@ -436,14 +432,7 @@ def _best_rung(
     best, least, worse = rungs[0], np.inf, 0
     for rung in dict.fromkeys(rungs):
         network = learn(
-            X[~judging],
-            Y[~judging],
-            inputs,
-            outputs,
-            settings=rung,
-            passes=min(passes, _TRIAL_PASSES),
-            seed=seed,
-            weights=w,
+            X[~judging], Y[~judging], inputs, outputs, settings=rung, passes=passes, seed=seed, weights=w
         ).network
         error = relative_error(network.predict(X[judging]), Y[judging], spread)
         worse = 0 if error < least else worse + 1

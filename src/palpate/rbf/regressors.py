@@ -27,7 +27,7 @@ from palpate.errors import UsageError
 from palpate.kernels import kernel
 from palpate.network.radial import RADIAL_FUNCTIONS, RadialFunction, radial, third
 from palpate.rbf.derivative_kernels import Derivatives, Pattern, curvatures_by_factors, slopes_by_factors
-from palpate.rbf.forms import Centred, Form, chain_of
+from palpate.rbf.forms import Form, chain_of
 
 __all__ = ["Regressors", "Tail", "pairs"]
 
@@ -79,26 +79,11 @@ class Regressors:
 
     def by_theta(self, X: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """φ (N, h) and ∂φ_k/∂θ_k (N, h, p)."""
-        if len(X) == 1 and isinstance(self.form, Centred):
-            return self._centred_at(X[0], theta)
         v = self._v(X, *self.form.factors(theta))
         g, g1, _ = radial(self.radial, np.einsum("nkr,nkr->nk", v, v))
         by_v = 2.0 * g1[..., None] * v
         by_entry = by_v[..., self.form.rows] * X[:, None, self.form.columns]
         return g, self.form.pull(theta, by_entry, -by_v)
-
-    def _centred_at(self, x: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same at one point x (n,) of units with centres, compiled: the sequential filter asks nothing as often."""
-        form, h = self.form, len(theta)
-        assert isinstance(form, Centred)
-        v, by_v, out = np.empty((h, form.inputs)), np.empty((h, form.inputs)), np.empty((1, h, form.size))
-        widths = form.widths(theta)
-        _centred_distances(x, theta, widths, form.rows, form.columns, v)
-        g, g1, _ = radial(self.radial, (v * v).sum(axis=1))
-        np.multiply(2.0 * g1[:, None], v, out=by_v)
-        log = form.log
-        _centred_slopes(x, theta, widths, form.rows, form.columns, by_v, log, out[0])
-        return g[None], out
 
     def scaled_by_theta(self, X: np.ndarray, theta: np.ndarray, scale: np.ndarray, out: np.ndarray) -> None:
         """∂φ_k/∂θ_k times scale (N,) into out (N, h, p), without the memory that `by_theta` takes."""
@@ -174,53 +159,6 @@ class Regressors:
         """A_k x − b_k (N, h, r)."""
         h, r, n = A.shape
         return np.asarray((X @ A.reshape(h * r, n).T).reshape(len(X), h, r) - b)
-
-
-@kernel
-def _centred_distances(
-    x: np.ndarray,
-    theta: np.ndarray,
-    widths: np.ndarray,
-    rows: np.ndarray,
-    columns: np.ndarray,
-    v: np.ndarray,
-) -> None:
-    """A_k (x − μ_k) into v (h, n), of units whose A has a diagonal of reciprocal widths (h, n) and entries below."""
-    h, n = v.shape
-    below = theta.shape[1] - (rows.size - n)
-    for k in range(h):
-        for i in range(n):
-            v[k, i] = (x[i] - theta[k, i]) / widths[k, i]
-        for e in range(n, rows.size):
-            v[k, rows[e]] += theta[k, below + e - n] * (x[columns[e]] - theta[k, columns[e]])
-
-
-@kernel
-def _centred_slopes(
-    x: np.ndarray,
-    theta: np.ndarray,
-    widths: np.ndarray,
-    rows: np.ndarray,
-    columns: np.ndarray,
-    by_v: np.ndarray,
-    log: bool,
-    out: np.ndarray,
-) -> None:
-    """Derivatives (h, n) by A_k (x − μ_k) to those by θ_k (h, p)."""
-    h, n = by_v.shape
-    below = theta.shape[1] - (rows.size - n)
-    shared = below - n < n  # one width for all axes
-    for k in range(h):
-        t, o = by_v[k], out[k]
-        o[n:below] = 0.0
-        for i in range(n):
-            o[i] = -t[i] / widths[k, i]
-            slope = o[i] * (x[i] - theta[k, i])
-            o[n if shared else n + i] += slope if log else slope / widths[k, i]
-        for e in range(n, rows.size):
-            i, j, at = rows[e], columns[e], below + e - n
-            o[j] -= t[i] * theta[k, at]
-            o[at] = t[i] * (x[j] - theta[k, j])
 
 
 @kernel

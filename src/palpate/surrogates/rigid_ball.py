@@ -36,7 +36,7 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 @dataclass(frozen=True)
 class PadPart:
-    """What a pad takes of one press."""
+    """The pad's part in one press."""
 
     depth: float  # of the press, m
     force: float  # with the pad, N

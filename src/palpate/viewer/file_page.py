@@ -13,7 +13,7 @@ import html
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -144,14 +144,8 @@ class _Page:
             **own_parts,
         }
         room = LARGEST - sum(map(len, parts.values())) - sum(len(text) for text in _statics())
-        fields: list[_PageField] = []
-        for index, name in enumerate(names):
-            own = block if index == 0 else _block_of_field(surrogate, keys[name], block)
-            further = _page_field(surrogate.fields[keys[name]], own, coarse.modes(index), surface)
-            size = len(further.modes) + len(further.weights) * (index > 0)
-            if index == 0 or size <= room - _MARGIN:
-                fields.append(further)
-                room -= size
+        chosen = [keys[name] for name in names]
+        fields = list(_fields_with_room(surrogate, chosen, block, coarse, surface, room))
         kept = {field.shown.name for field in fields}
         left_out = tuple(field.name for field in surrogate.fields.values() if field.name not in kept)
         card = card_of(surrogate).with_hash(f"{bare.label}, of a page", bare.hash)
@@ -247,6 +241,24 @@ def _step(rest: np.ndarray, hello: Hello) -> float:
     moves = bool(hello.fields) and hello.fields[0].components == 3
     wanted = 2.0 * MOVED * PROMISE * hello.fields[0].high if moves else size * 2**-19
     return max(wanted, size * FINEST)
+
+
+def _fields_with_room(
+    surrogate: Surrogate,
+    keys: Sequence[str],
+    block: WeightsBlock,
+    coarse: SurfaceDrawing,
+    surface: PackedSurface,
+    room: int,
+) -> Iterator[_PageField]:
+    """Yield the first field, which the body's block holds, and those after it for which `room` (bytes) is left."""
+    for index, key in enumerate(keys):
+        own = block if index == 0 else _block_of_field(surrogate, key, block)
+        further = _page_field(surrogate.fields[key], own, coarse.modes(index), surface)
+        size = len(further.modes) + len(further.weights) * (index > 0)
+        if index == 0 or size <= room - _MARGIN:
+            yield further
+            room -= size
 
 
 def _block_of_field(surrogate: Surrogate, name: str, block: WeightsBlock) -> WeightsBlock:

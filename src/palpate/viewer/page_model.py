@@ -90,7 +90,7 @@ class PageModel:
 
     @cached_property
     def pad_words(self) -> str:
-        """What the pad takes of a press, in words; empty where there is no pad."""
+        """Return the pad's part in a press, in words; empty where there is no pad."""
         part = pad_part_of(self.body.energy, self.body.meta)
         return "" if part is None else str(part)
 

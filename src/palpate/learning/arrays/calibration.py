@@ -26,11 +26,11 @@ import numpy as np
 from scipy.special import stdtrit
 
 from palpate.learning.arrays.array_samples import ArrayProblem, Samples
+from palpate.learning.arrays.compared_rows import ComparedRows
 from palpate.learning.arrays.fit_notes import notes_on
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import HeldOut
 from palpate.learning.arrays.influence import Influence
-from palpate.learning.arrays.judged_rows import JudgedRows
 from palpate.learning.arrays.members import ROWS, Crossed, CrossedLayers
 from palpate.learning.ensemble import Ensemble
 from palpate.learning.kernel_layer import KernelLayer, Metric
@@ -321,5 +321,5 @@ class Finish:
         )
         notes = notes_on(self.samples, self.problem, fitted, evidence.missed, rows, self.scales)
         wanted = self.samples.Y[rows]
-        judged = JudgedRows(wanted, wanted - evidence.missed * self.problem.scaling.output_scale)
-        return replace(fitted, notes=notes, judged=judged)
+        comparison = ComparedRows(wanted, wanted - evidence.missed * self.problem.scaling.output_scale)
+        return replace(fitted, notes=notes, comparison=comparison)

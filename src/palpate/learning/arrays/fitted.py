@@ -13,8 +13,8 @@ import numpy as np
 from palpate.errors import FileFormatError, UsageError
 from palpate.format import duration, share
 from palpate.learning.arrays.array_samples import points
+from palpate.learning.arrays.compared_rows import ComparedRows, measured
 from palpate.learning.arrays.influence import Influence
-from palpate.learning.arrays.judged_rows import JudgedRows, measured
 from palpate.learning.search import Trial
 from palpate.network import Network, TrainedRegion
 from palpate.network.uncertainty import Uncertainty
@@ -65,7 +65,7 @@ class Fitted:
         How the answers hang on single samples, where these were few.
     outlook : str
         What more time, or more rows, may bring; "" for a network read from a file.
-    judged : JudgedRows, optional
+    comparison : ComparedRows, optional
         The rows that judged, with what was answered there before they were learnt; not in a file.
     """
 
@@ -85,7 +85,7 @@ class Fitted:
     columns: tuple[str, ...] = ()
     influence: Influence | None = None
     outlook: str = ""
-    judged: JudgedRows | None = None
+    comparison: ComparedRows | None = None
 
     def predict(self, X: Any) -> np.ndarray:
         """Return outputs (N, m) at inputs X (N, n); (N,) where Y was.
@@ -208,9 +208,9 @@ class Fitted:
         if X is not None:
             X = self._points(X)
             Y = measured(Y, len(X), len(self.network.outputs))
-            rows = JudgedRows(Y, self.network.predict(X), "answers at the rows given")
-        elif self.judged is not None:
-            rows = self.judged
+            rows = ComparedRows(Y, self.network.predict(X), "answers at the rows given")
+        elif self.comparison is not None:
+            rows = self.comparison
         else:
             raise UsageError(
                 "There are no rows to compare with.",

@@ -146,6 +146,8 @@ def _iterate(
     (f, H), z, least = prediction, prior, np.inf
     best: _Linearisation | None = None
     for i in range(settings.iterations):
+        if i:
+            f, H = linearise(state.with_parameters(z), observation, settings)
         PH = P.times(H.T)
         HPH = H @ PH
         S = HPH + np.diag(R)
@@ -157,12 +159,7 @@ def _iterate(
         z = prior + PH @ lam
         if settings.iterations == 1:
             return _Linearisation(z, PH, S, factor)
-        moved = state.with_parameters(z)
-        if i + 1 < settings.iterations:  # the next round's problem tells the cost of this one
-            f, H = linearise(moved, observation, settings)
-        else:
-            f = measurement(moved, observation, settings)
-        error = targets - f
+        error = targets - measurement(state.with_parameters(z), observation, settings)
         cost = float(error @ (error / R)) + float(lam @ HPH @ lam)
         if best is not None and not cost < least:
             break

@@ -13,14 +13,14 @@ from palpate.errors import UsageError
 from palpate.tables import numbers_of
 from palpate.units import Quantity
 
-__all__ = ["JudgedRows", "measured"]
+__all__ = ["ComparedRows", "measured"]
 
 _PANELS = 6  # outputs that a figure shows, those of the largest spread
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedRows:
-    """What was measured, and what was answered, both (J, m) in SI units."""
+class ComparedRows:
+    """Rows with what was measured and what was answered, both (J, m) in SI units."""
 
     measured: np.ndarray
     answered: np.ndarray

@@ -24,6 +24,7 @@ from palpate.physics.shapes.body_file import (
 )
 from palpate.physics.shapes.cad_file import read_cad, states_unit
 from palpate.physics.shapes.detail_size import detail_note, least_element
+from palpate.physics.shapes.divided_surface import MOST_DRAWN
 from palpate.physics.shapes.filled_surface import bodies_apart, fill_surface, name_parts, read_surface
 from palpate.physics.shapes.mesh import BodyMesh, body_mesh, to_ngsolve
 from palpate.physics.shapes.meshing import GRADING, FineMesh, mesh_solid
@@ -34,8 +35,6 @@ from palpate.physics.shapes.surface_repair import is_manifold
 from palpate.physics.shapes.surface_simplify import TOLERANCE, simplify_surface
 
 __all__ = ["ImportedSolid"]
-
-MOST_DRAWN = 100_000  # triangles of a surface that pictures show: a page draws them without a stop
 
 
 @dataclass(frozen=True)

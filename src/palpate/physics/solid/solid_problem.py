@@ -18,6 +18,7 @@ from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.pads import advise_on_pad
 from palpate.physics.interactions.sphere import SphereProbe
+from palpate.physics.shapes.divided_surface import MOST_DRAWN, divide_large
 from palpate.physics.shapes.naming import require_known
 from palpate.physics.solid.body_symmetry import symmetry_of
 from palpate.physics.solid.solid_checks import (
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
     from palpate.physics.solid.solid_solver import SolidSolver
 
 __all__ = ["SolidProblem"]
+
+
+FINE = 0.1  # quantile of the sides of the surface's elements: they are fine where the body is touched
 
 
 @dataclass(frozen=True)
@@ -138,8 +142,18 @@ class SolidProblem:
             triangles=mesh.triangles,
             surfaces=mesh.surfaces,
             surface_of=mesh.surface_of,
-            drawn=getattr(self.body.geometry, "drawn", None),
+            drawn=self._drawn(),
         )
+
+    def _drawn(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the surface that pictures show, as fine as the finest elements; None for that of the mesh."""
+        own = getattr(self.body.geometry, "drawn", None)
+        if own is None:
+            return None
+        mesh = self.mesh
+        sides = mesh.points[mesh.triangles] - np.roll(mesh.points[mesh.triangles], 1, axis=1)
+        fine = float(np.quantile(np.linalg.norm(sides, axis=2), FINE))
+        return divide_large(own[0], own[1], fine, MOST_DRAWN)
 
     @property
     def schema(self) -> tuple[Field, ...]:

@@ -178,16 +178,20 @@ def test_a_query_allocates_nothing(radial):
     evaluator, x = network.evaluator(jacobian=True), points(network, 1)[0]
     for _ in range(10):
         evaluator(x)
-    tracemalloc.start()
-    try:
-        before = tracemalloc.get_traced_memory()[0]
-        tracemalloc.reset_peak()
-        for _ in range(100):
-            evaluator(x)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert peak - before < 1000  # objects of the call itself; an array of 40 outputs with its header has more
+    peaks = []
+    for _ in range(
+        5
+    ):  # a thread that another library keeps allocates now and then: what a query takes it takes always
+        tracemalloc.start()
+        try:
+            before = tracemalloc.get_traced_memory()[0]
+            tracemalloc.reset_peak()
+            for _ in range(100):
+                evaluator(x)
+            peaks.append(tracemalloc.get_traced_memory()[1] - before)
+        finally:
+            tracemalloc.stop()
+    assert min(peaks) < 1000  # objects of the call itself; an array of 40 outputs with its header has more
 
 
 def test_evaluator_takes_lists_and_integers_and_refuses_other_sizes():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from touch_made import touch_energy
 
-from palpate.dataset.carried_surface import CarriedSurface, quadratic_triangles, quartered
+from palpate.dataset.carried_surface import CarriedSurface, quadratic_triangles, quarter_triangles
 from palpate.errors import UsageError
 from palpate.surrogates import FieldSurrogate, Surrogate
 
@@ -24,7 +24,7 @@ def sphere(parts: int) -> tuple[np.ndarray, np.ndarray]:
     )
     for _ in range(parts):
         edges, cells = quadratic_triangles(triangles, len(points))
-        points, triangles = np.concatenate([points, points[edges].sum(axis=1)]), quartered(cells)
+        points, triangles = np.concatenate([points, points[edges].sum(axis=1)]), quarter_triangles(cells)
         points /= np.linalg.norm(points, axis=1, keepdims=True)
     return RADIUS * points, triangles
 
@@ -34,7 +34,7 @@ def bound(coarse: int, fine: int) -> tuple[CarriedSurface, np.ndarray, np.ndarra
     points, triangles = sphere(coarse)
     edges, cells = quadratic_triangles(triangles, len(points))
     nodes = np.concatenate([points, points[edges].mean(axis=1)])
-    return CarriedSurface.bind(*sphere(fine), nodes, cells), nodes, quartered(cells)
+    return CarriedSurface.bind(*sphere(fine), nodes, cells), nodes, quarter_triangles(cells)
 
 
 def feet(own: CarriedSurface, nodes: np.ndarray, quarters: np.ndarray) -> np.ndarray:
@@ -121,7 +121,7 @@ def drawn_field() -> FieldSurrogate:
     cells = np.hstack([corners, (corners + np.roll(corners, -1, axis=1)) // 2])
     fine = field_made.grid(29)
     own = CarriedSurface.bind(fine[0][:-1], fine[1], made.points, cells)
-    return replace(made, triangles=quartered(cells), drawn=own)
+    return replace(made, triangles=quarter_triangles(cells), drawn=own)
 
 
 def test_a_field_keeps_its_drawn_surface_in_the_file(tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from palpate.dataset.carried_surface import CarriedSurface, quartered, surface_nodes
+from palpate.dataset.carried_surface import CarriedSurface, quarter_triangles, surface_nodes
 from palpate.physics import Body, ImportedSolid, NeoHookean, SphereProbe, SurfacePatch
 
 HALF_AXES = np.array([0.045, 0.03, 0.02])  # m
@@ -46,7 +46,7 @@ def pressed(organ: ImportedSolid, element: float) -> tuple[CarriedSurface, np.nd
     used = np.unique(mesh.triangles)
     values = np.concatenate([solution.displacement[used], solution.mid_displacement])
     bound = CarriedSurface.bind(*own, nodes, cells)
-    return bound, bound.carry(values, quartered(cells)), float(np.linalg.norm(solution.force))
+    return bound, bound.carry(values, quarter_triangles(cells)), float(np.linalg.norm(solution.force))
 
 
 def kinks(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

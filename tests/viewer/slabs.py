@@ -8,7 +8,7 @@ import numpy as np
 
 import pressed
 from models import linear_network
-from palpate.dataset.carried_surface import CarriedSurface, quadratic_triangles, quartered
+from palpate.dataset.carried_surface import CarriedSurface, quadratic_triangles, quarter_triangles
 from palpate.surrogates import (
     ContactBaseline,
     ContactLaw,
@@ -58,7 +58,9 @@ def carried_slab() -> Surrogate:
     nodes = np.concatenate([points, points[edges].mean(axis=1)])
     own = CarriedSurface.bind(*box(30), nodes, cells)
     shown = {"displacement": 3, "largest stretch": 1}
-    fields = {name: _field(body.energy, k, (nodes, quartered(cells)), own) for name, k in shown.items()}
+    fields = {
+        name: _field(body.energy, k, (nodes, quarter_triangles(cells)), own) for name, k in shown.items()
+    }
     return replace(body, fields=fields)
 
 

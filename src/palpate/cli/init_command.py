@@ -62,7 +62,7 @@ def init(
     elif file_kind(path) == "a part":
         _init_part(path, choices, preset, force=force, show=show)
     else:
-        _init_named(path, preset, choices, force=force, show=show)
+        _init_preset(path, preset, choices, force=force, show=show)
 
 
 def _init_part(path: Path, choices: PartOptions, preset: str, *, force: bool, show: bool) -> None:
@@ -89,7 +89,7 @@ def _init_part(path: Path, choices: PartOptions, preset: str, *, force: bool, sh
     typer.echo(plain_text(f"Next: palpate touch {path}{named}, or palpate sweep {target}"))
 
 
-def _init_named(path: Path, preset: str, choices: PartOptions, *, force: bool, show: bool) -> None:
+def _init_preset(path: Path, preset: str, choices: PartOptions, *, force: bool, show: bool) -> None:
     """Write the study of a name under a path, or print it."""
     from palpate.study import preset_study, to_toml
 

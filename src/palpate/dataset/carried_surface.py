@@ -26,7 +26,7 @@ __all__ = [
     "CarriedSurface",
     "has_middles",
     "quadratic_triangles",
-    "quartered",
+    "quarter_triangles",
     "surface_nodes",
     "surface_values",
 ]
@@ -49,7 +49,7 @@ def quadratic_triangles(triangles: np.ndarray, nodes: int) -> tuple[np.ndarray, 
     return edges, np.hstack([triangles, nodes + which.reshape(-1, 3)])
 
 
-def quartered(cells: np.ndarray) -> np.ndarray:
+def quarter_triangles(cells: np.ndarray) -> np.ndarray:
     """Return four triangles (4 t, 3) in place of each one of six nodes (t, 6)."""
     return np.asarray(cells[:, QUARTERS].reshape(-1, 3))
 
@@ -131,7 +131,7 @@ class CarriedSurface:
             out += self.shares[:, k, None] * values[..., nodes[:, k], :]
         return out
 
-    def marked(self, mark: np.ndarray) -> np.ndarray:
+    def spread_mark(self, mark: np.ndarray) -> np.ndarray:
         """Return for each triangle (t,) whether a corner is bound where a mark (4 c,) of a field's triangles is."""
         marked = np.asarray(np.asarray(mark, dtype=bool).reshape(-1, 4).any(axis=1))
         bound = marked[self.cells]

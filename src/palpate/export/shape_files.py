@@ -15,7 +15,7 @@ from palpate.dataset import Dataset
 from palpate.dataset.carried_surface import (
     CarriedSurface,
     has_middles,
-    quartered,
+    quarter_triangles,
     surface_nodes,
     surface_values,
 )
@@ -137,7 +137,7 @@ def series_of_dataset(data: Dataset, rows: Sequence[int] | None = None, name: st
         points, cells = own.points, own.triangles
         known = {"u": "displacement"} | ({"von Mises stress": "von_mises"} if fields else {})
         carried = {
-            key: own.carry(surface_values(good, name, middles=True), quartered(parts))
+            key: own.carry(surface_values(good, name, middles=True), quarter_triangles(parts))
             for key, name in known.items()
         }
         u = carried.pop("u")

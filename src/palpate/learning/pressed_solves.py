@@ -12,7 +12,7 @@ from palpate.dataset import Dataset, Layout
 from palpate.dataset.carried_surface import (
     CarriedSurface,
     has_middles,
-    quartered,
+    quarter_triangles,
     surface_nodes,
     surface_values,
 )
@@ -110,7 +110,7 @@ class PressedSolves:
                 shoulder=SHOULDER * radius,
             ),
             points,
-            own if drawn is None else quartered(own),
+            own if drawn is None else quarter_triangles(own),
             matrices,
             about,
             None if element is None else float(element) ** 2 / (2 * radius),
@@ -145,7 +145,7 @@ class PressedSolves:
         """
         data, series = self.data, self.depth_series
         points, own = surface_nodes(data.rest, data.triangles, self.drawn is not None)
-        triangles = own if self.drawn is None else quartered(own)
+        triangles = own if self.drawn is None else quarter_triangles(own)
         mass = lumped_mass(points, triangles)
         solved = surface_values(data, name, self.drawn is not None)
         images = []

@@ -132,7 +132,7 @@ class _Page:
         coarse = SurfaceDrawing(model.body, detail=False)
         step = _step(np.asarray(model.surface.rest), hello)
         surface = PackedSurface.of(coarse.surface, step)
-        drawn, own_parts = _drawn(model, surface, step)
+        drawn, own_parts = _pack_own_surface(model, surface, step)
         keys = {field.name: key for key, field in surrogate.fields.items()}
         names = [info.name for info in hello.fields]
         block = WeightsBlock.of(surrogate, field=keys[names[0]] if names else None)
@@ -267,7 +267,7 @@ def _block_of_field(surrogate: Surrogate, name: str, block: WeightsBlock) -> Wei
     return WeightsBlock({k: v for k, v in tables.items() if not SURFACE <= k < SURFACE + 3}, field=name)
 
 
-def _drawn(
+def _pack_own_surface(
     model: PageModel, carrier: PackedSurface, step: float
 ) -> tuple[dict[str, Any] | None, dict[str, str]]:
     """Return the facts and parts of the body's own surface and of its binding; none where the field's is drawn."""

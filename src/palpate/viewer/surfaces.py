@@ -104,7 +104,7 @@ def touchable_triangles(body: Touchable, field: FieldSurrogate, *, detail: bool 
         mark &= field.touched[field.triangles].all(axis=1)
     if detail and field.drawn is not None:
         points, triangles = field.pictured
-        mark = field.drawn.marked(mark) & _beside(body, points[triangles])[1]
+        mark = field.drawn.spread_mark(mark) & _beside(body, points[triangles])[1]
     return np.asarray(mark)
 
 

@@ -13,7 +13,7 @@ from palpate.errors import UsageError
 from palpate.tables import numbers_of
 from palpate.units import Quantity
 
-__all__ = ["ComparedRows", "measured"]
+__all__ = ["ComparedRows", "check_outputs"]
 
 _PANELS = 6  # outputs that a figure shows, those of the largest spread
 
@@ -52,7 +52,7 @@ class ComparedRows:
         return figure
 
 
-def measured(Y: Any, rows: int, outputs: int) -> np.ndarray:
+def check_outputs(Y: Any, rows: int, outputs: int) -> np.ndarray:
     """Return outputs (N, m) to compare with as numbers; (N,) will do for one."""
     Y = numbers_of("Outputs Y", Y)
     Y = Y[:, None] if Y.ndim == 1 else Y

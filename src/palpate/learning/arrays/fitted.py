@@ -13,7 +13,7 @@ import numpy as np
 from palpate.errors import FileFormatError, UsageError
 from palpate.format import duration, share
 from palpate.learning.arrays.array_samples import points
-from palpate.learning.arrays.compared_rows import ComparedRows, measured
+from palpate.learning.arrays.compared_rows import ComparedRows, check_outputs
 from palpate.learning.arrays.influence import Influence
 from palpate.learning.search import Trial
 from palpate.network import Network, TrainedRegion
@@ -184,7 +184,7 @@ class Fitted:
             If X or Y has the wrong shape.
         """
         X = self._points(X)
-        Y = measured(Y, len(X), len(self.network.outputs))
+        Y = check_outputs(Y, len(X), len(self.network.outputs))
         left = ((Y - self.network.predict(X)) ** 2).sum(axis=0)
         whole = ((Y - Y.mean(axis=0)) ** 2).sum(axis=0)
         ratio = left / np.where(whole > 0, whole, 1.0)
@@ -207,7 +207,7 @@ class Fitted:
         """
         if X is not None:
             X = self._points(X)
-            Y = measured(Y, len(X), len(self.network.outputs))
+            Y = check_outputs(Y, len(X), len(self.network.outputs))
             rows = ComparedRows(Y, self.network.predict(X), "answers at the rows given")
         elif self.comparison is not None:
             rows = self.comparison
@@ -229,7 +229,7 @@ class Fitted:
         file : path, optional
             Its file, whose hash goes into the card.
         """
-        return card_of(self._recorded(), file)
+        return card_of(self._with_record(), file)
 
     def to_html(self) -> str:
         """Return the model card as one HTML page."""
@@ -257,10 +257,10 @@ class Fitted:
             region["member_tails"] = np.stack([member.tail for member in self.members])
         if self.influence is not None:
             region |= self.influence.arrays()
-        network = self._recorded(network)
+        network = self._with_record(network)
         return replace(network, extras={**network.extras, **region}).save(path)
 
-    def _recorded(self, network: Network | None = None) -> Network:
+    def _with_record(self, network: Network | None = None) -> Network:
         """Return the network, by default as it answers, with the record of its choice."""
         network = self.network if network is None else network
         kept = {

@@ -36,11 +36,11 @@ def divide_large(
         middle = np.full(len(edges), -1)
         middle[long] = len(points) + np.arange(int(long.sum()))
         points = np.vstack([points, points[edges[long]].mean(axis=1)])
-        triangles = _halved(triangles, middle[np.ravel(which)].reshape(-1, 3))
+        triangles = _divide_sides(triangles, middle[np.ravel(which)].reshape(-1, 3))
     return points, triangles
 
 
-def _halved(triangles: np.ndarray, middles: np.ndarray) -> np.ndarray:
+def _divide_sides(triangles: np.ndarray, middles: np.ndarray) -> np.ndarray:
     """Return triangles (t, 3) in parts; `middles` (t, 3) of their sides are points, −1 where a side stays whole."""
     count = (middles >= 0).sum(axis=1)
     parts = [triangles[count == 0]]

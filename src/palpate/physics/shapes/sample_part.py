@@ -7,13 +7,13 @@ rays from the middle leave the body.
 
 from __future__ import annotations
 
-import difflib
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from palpate.checks import did_you_mean
 from palpate.errors import UsageError
 from palpate.files import write_file
 from palpate.output_files import SAMPLE_HEAD
@@ -163,11 +163,10 @@ def sample_name(name: str) -> str:
     """Return the name of a sample part, in any case; refuse another name."""
     if (key := name.strip().lower()) in SAMPLES:
         return key
-    close = difflib.get_close_matches(key, SAMPLES, n=1)
     raise UsageError(
         f"There is no sample part called {name}.",
         why=f"There are {', '.join(SAMPLES)}.",
-        fix=f"Did you mean {close[0]}?" if close else "Name one of these.",
+        fix=did_you_mean(key, SAMPLES) or "Name one of these.",
     )
 
 

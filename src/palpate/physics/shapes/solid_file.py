@@ -149,7 +149,9 @@ class ImportedSolid(Shape):
 
         A larger surface is simplified within 1/2,000 of its length.
         """
-        return None if self.is_cad else _drawn(self.path, self.digest, self.unit or "m", self.simplify)
+        return (
+            None if self.is_cad else _drawn_surface(self.path, self.digest, self.unit or "m", self.simplify)
+        )
 
     @property
     def regions(self) -> tuple[str, ...]:
@@ -233,7 +235,9 @@ def _skin(shape: ImportedSolid) -> tuple[BodyMesh, float, tuple[str, ...]]:
 
 
 @lru_cache(maxsize=2)
-def _drawn(path: str, digest: str, unit: str, simplify: float | None) -> tuple[np.ndarray, np.ndarray]:
+def _drawn_surface(
+    path: str, digest: str, unit: str, simplify: float | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Points and triangles of a file's surface for pictures."""
     surface = _whole_surface(path, digest, unit, simplify)[2]
     if len(surface.triangles) > MOST_DRAWN and is_manifold(surface.triangles):

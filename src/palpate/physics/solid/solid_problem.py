@@ -142,10 +142,10 @@ class SolidProblem:
             triangles=mesh.triangles,
             surfaces=mesh.surfaces,
             surface_of=mesh.surface_of,
-            drawn=self._drawn(),
+            drawn=self._drawn_surface(),
         )
 
-    def _drawn(self) -> tuple[np.ndarray, np.ndarray] | None:
+    def _drawn_surface(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Return the surface that pictures show, as fine as the finest elements; None for that of the mesh."""
         own = getattr(self.body.geometry, "drawn", None)
         if own is None:

@@ -23,6 +23,7 @@ from palpate.export.field_tables import PROMISE, deepest_touches
 from palpate.network import Network
 from palpate.network.network_kernels import regressor_rows_into
 from palpate.surrogates import FieldSurrogate, LearntEnergy, Surrogate
+from palpate.surrogates.moving_rest import MovingRest
 from palpate.units import bounds
 
 __all__ = [
@@ -32,9 +33,11 @@ __all__ = [
     "Difference",
     "ExportedFile",
     "Precision",
+    "Releaser",
     "compare_body",
     "compare_field",
     "compare_network",
+    "compare_rest",
     "condition",
     "places",
     "true_answers",
@@ -54,6 +57,7 @@ _PARTS = {
 _ROUND_OFF = 1e-14  # m, depth that is round-off
 _TOUCHES = 24  # places at which a field is compared, beside the deepest touches
 _STROKE = 300  # steps of a memory's stroke
+_HISTORIES, _PLACES = 24, 6  # histories after which a body is let go, and places of each
 
 
 class Asker(Protocol):
@@ -69,6 +73,14 @@ class Asker(Protocol):
 
     def shapes(self, X: np.ndarray) -> np.ndarray:
         """Return the field (N, nodes, components) for each row of X (N, 3 + p)."""
+        ...
+
+
+class Releaser(Asker, Protocol):
+    """An export that also says where a body lies after a touch."""
+
+    def release(self, x: np.ndarray, seconds: float) -> np.ndarray:
+        """Return where (3,) the body lies, m, once it is let go for so long after `walk` at x (3 + p,)."""
         ...
 
 
@@ -372,6 +384,30 @@ def _stroke(surrogate: Surrogate, asker: Asker, precision: Precision) -> dict[st
         "memory": _difference(wanted[:, :3], got[:, :3], limit),
         "stored": _difference(wanted[:, 3:], got[:, 3:], limit),
     }
+
+
+def compare_rest(surrogate: Surrogate, export: Releaser) -> Difference:
+    """Return how far the places are from palpate where a body lies that was led about and let go."""
+    energy, memory, rng = surrogate.energy, surrogate.memory, np.random.default_rng(3)
+    assert memory is not None
+    low, high = bounds(energy.inputs)
+    D = energy.baseline.directions
+    wanted, got = np.empty((_HISTORIES, 3)), np.empty((_HISTORIES, 3))
+    for i, pause in enumerate(rng.uniform(0.0, 1.0, _HISTORIES)):
+        U = rng.uniform(low, high, (_PLACES, len(low)))
+        U[:, 1:] = U[-1, 1:]
+        X, steps = np.hstack([U[:, :1] @ D, U[:, 1:]]), rng.uniform(0.0, 0.2, _PLACES)
+        evaluate, state = energy.evaluator(), memory.start()
+        moved = MovingRest(evaluate, state, D[0])
+        for x, step in zip(X, steps, strict=True):
+            evaluate(x[:3], x[3:])
+            state.step(x[:3].copy(), evaluate.amplitude, evaluate.slope, float(step))
+        moved.lies[:] = X[-1, :3]
+        moved.release(float(pause), X[-1, 3:])
+        wanted[i] = moved.lies
+        export.walk(np.ascontiguousarray(np.hstack([steps[:, None], X])))
+        got[i] = export.release(X[-1], float(pause))
+    return _difference(wanted, got, np.full(_HISTORIES, _LOOSEST / 10.0))
 
 
 def compare_field(

@@ -127,7 +127,7 @@ class Surrogate:
         Raises
         ------
         UsageError
-            If the body lies elsewhere after a touch, or a part of it has no C source.
+            If a part of the body has no C source.
         """
         return page_of(self)
 

@@ -50,6 +50,8 @@ export class FileConnection {
   }
 
   send(hand: Hand): void {
+    // at once: until the next picture the hand may have gone on
+    if (hand.grabbed && !this.hand?.grabbed) this.rest?.take(this.moved(hand.target));
     this.hand = hand;
   }
 
@@ -82,10 +84,15 @@ export class FileConnection {
 
   /** Where the hand wants the probe's centre, or what it holds, m. */
   private wanted(target: Vec3): Vec3 {
-    const [x, y, z] = target.map((v) => v * this.hello.scale) as Vec3;
-    const moved: Vec3 = this.line ? [x, y, z] : [x, -z, y]; // a device's y is up, as a line's; a solid's z
+    const moved = this.moved(target);
     if (this.rest) return this.rest.lead(moved);
     return this.hello.holds ? moved : (moved.map((v, k) => v + this.hello.centre[k]!) as Vec3);
+  }
+
+  /** The hand's place in the axes of the body, from the device's centre, m. */
+  private moved(target: Vec3): Vec3 {
+    const [x, y, z] = target.map((v) => v * this.hello.scale) as Vec3;
+    return this.line ? [x, y, z] : [x, -z, y]; // a device's y is up, as a line's; a solid's z
   }
 
   private follow(to: Vec3, elapsed: number): void {

@@ -18,11 +18,16 @@ export class MovingRest {
     return this.lies;
   }
 
+  /** A hand at this place takes hold where the body lies, and gives its grip. */
+  take(hand: Vec3): Vec3 {
+    const along = this.along(hand);
+    return (this.grip = this.lies.map((v, i) => v - along[i]!) as Vec3);
+  }
+
   /** Where a hand at this place leads what it holds, m. */
   lead(hand: Vec3): Vec3 {
-    const along = this.along(hand);
-    this.grip ??= this.lies.map((v, i) => v - along[i]!) as Vec3;
-    return hand.map((v, i) => v + this.grip![i]!) as Vec3;
+    const grip = this.grip ?? this.take(hand);
+    return hand.map((v, i) => v + grip[i]!) as Vec3;
   }
 
   /** Take note that the hand has led it to this place. */

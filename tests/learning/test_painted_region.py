@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.learning.painted_region import DEVIATION, MOST, SLACK, cover, painted_region
+from palpate.surrogates.model_card import card_of
 from pressed import DEEPEST, RADIUS, surrogate
 
 PAINT = 0.015  # half the side of the painted square, m
@@ -88,3 +89,11 @@ def test_balls_hold_no_place_outside():
     distances = region.distances(points)
     assert not (distances[radius > 0.65] <= region.radius).any()
     assert (distances[radius < 0.6] <= region.radius).mean() > 0.98
+
+
+def test_the_card_says_how_much_of_the_paint_is_trained():
+    card = card_of(surrogate(meta={"painted": {"painted_area": 54e-4, "trained_area": 53e-4}}))
+    assert card.as_dict()["trained_on"]["painted_area"] == 54e-4
+    assert card.as_dict()["trained_on"]["trained_area"] == 53e-4
+    assert any("54 cm²" in sentence and "53 cm²" in sentence for sentence in card.limits)
+    assert "m²" in card.to_markdown()

@@ -104,3 +104,14 @@ def test_the_places_are_all_over_the_touched_surface(ball: Study):
     assert depth.max() < 0.0022
     low, high = np.array([(r.low, r.high) for r in problem.ranges]).T
     assert ((low <= X) & (high >= X)).all()
+
+
+def test_presses_that_judge_are_even_over_area_and_depth(ball: Study):
+    problem = ball.problem()
+    X = problem.interactions[0].random_presses(problem.body.geometry, 2000, seed=1)
+    away = np.linalg.norm(X, axis=1)
+    height, depth = X[:, 2] / away, BALL + 0.004 - away
+    # Archimedes: on a sphere even by area is even by height, here from cos 60° to 1; so is the depth between its ends
+    for values, low, high in ((height, 0.5, 1.0), (depth, *ball.interaction.depth)):
+        shares = np.histogram(values, np.linspace(low, high, 5))[0] / len(X)
+        assert shares == pytest.approx(0.25, abs=0.04)  # four deviations of a binomial law

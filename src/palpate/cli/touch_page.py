@@ -194,6 +194,7 @@ class TouchedPart:
             "error_median": step.median,
             "error_p95": step.error,
             "places": places,
+            **{name: figures[name] for name in ("painted_area", "trained_area") if name in figures},
         }
         self._show(**known, trial=trial_in_words(step) or self._progress.trial)
 

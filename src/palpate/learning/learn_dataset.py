@@ -178,7 +178,8 @@ def learn(
         searches = vars(options) | {"seconds": limit(1.0 / (len(fields) - i))}
         learnt[shown] = known.learn_field(FieldOptions(name=shown, unit=_SHOWN[shown][1], **searches))
     origin = {"hash": train.ok.hash, "provenance": train.provenance}
-    areas = {} if painted is None else {"painted": painted.record()}
+    # a region by the paint does not remember where it was solved; a validation asks for it
+    areas = {} if painted is None else {"painted": painted.record(), "solved_at": train.ok.X.tolist()}
     meta = {**found.meta, **known.meta, **areas, "name": name, "dataset": origin}
     surrogate = Surrogate(energy, {**known.fields, **{k: v.field for k, v in learnt.items()}}, meta=meta)
     spent = time.monotonic() - began

@@ -177,6 +177,17 @@ class SphereProbe(PlainInteraction):
         points = contacts[:, None] + (self.radius - depths)[:, :, None] * normals[:, None]
         return np.asarray(points.reshape(-1, 3)[:samples])
 
+    def random_presses(self, geometry: Geometry, samples: int, seed: int) -> np.ndarray:
+        """Return positions (samples, 3) in m, independent of each other, even over the touched area and all depths.
+
+        They judge a surrogate by what was to be touched, margin and rim of its design aside.
+        """
+        rng = np.random.default_rng(seed)
+        touched = surface_of(geometry, self.touches, self.refinements(geometry))
+        contacts, normals = touched.spread_with_normals(rng.random((samples, 2)))
+        depths = rng.uniform(*self.depth, samples)
+        return np.asarray(contacts + (self.radius - depths)[:, None] * normals)
+
     def chains(self, geometry: Geometry, points: np.ndarray) -> list[np.ndarray]:
         """Return rows of positions (N, 3) in chains: depth series, else neighbours, from shallow to deep."""
         centres = np.asarray(points, dtype=float)

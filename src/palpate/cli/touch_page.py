@@ -189,7 +189,7 @@ class TouchedPart:
         if step.phase in {"learnt", "judged"}:
             self.console.say(step_line(step))
         places = np.array(step.places, dtype=float).reshape(-1, 3)
-        known = {
+        known: dict[str, Any] = {
             "solves": step.solves,
             "error_median": step.median,
             "error_p95": step.error,

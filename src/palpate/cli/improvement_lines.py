@@ -81,6 +81,7 @@ def improve_and_print(
     assert last is not None
     outcome = conclude(study, paths, last)
     content = {"steps": steps, "reached": last.reached, "reason": last.reason, "model": str(paths.model)}
+    content |= outcome.model.meta.get("painted", {})  # areas in m²
     return outcome, content, None if last.reached else _failure(study, options.until, last)
 
 

@@ -189,11 +189,12 @@ class TouchedPart:
         if step.phase in {"learnt", "judged"}:
             self.console.say(step_line(step))
         places = np.array(step.places, dtype=float).reshape(-1, 3)
-        known = {
+        known: dict[str, Any] = {
             "solves": step.solves,
             "error_median": step.median,
             "error_p95": step.error,
             "places": places,
+            **{name: figures[name] for name in ("painted_area", "trained_area") if name in figures},
         }
         self._show(**known, trial=trial_in_words(step) or self._progress.trial)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from palpate.dataset import Dataset, Layout
@@ -19,10 +20,11 @@ from palpate.learning.fields import LearntField, learn_snapshots, lumped_mass
 from palpate.learning.learning_history import History
 from palpate.learning.pad_fit import fit_pad
 from palpate.learning.pad_solves import is_padded, pad_solves
+from palpate.learning.painted_region import PaintedRegion
 from palpate.learning.pressed_solves import PressedSolves, is_pressed
 from palpate.learning.search import Budget
 from palpate.options import FieldOptions, SearchOptions, takes
-from palpate.surrogates import Baseline, ContactLaw, Solves, Surrogate
+from palpate.surrogates import Baseline, ContactLaw, LearntEnergy, Solves, Surrogate
 from palpate.surrogates.baselines import registered_baselines
 
 __all__ = ["LearningHistory", "filter_record", "learn"]
@@ -93,6 +95,7 @@ class _Recognised:
     solves: Solves
     options: Mapping[str, Any]  # of learning its energy
     learn_field: Callable[[FieldOptions], LearntField] | None = None
+    region: Callable[[LearntEnergy], PaintedRegion | None] | None = None  # in place of that around the solves
     fields: Mapping[str, Any] = field(default_factory=dict)  # that are learnt already
     meta: Mapping[str, Any] = field(default_factory=dict)
     filter: History | None = None
@@ -125,9 +128,11 @@ def learn(
         Told what begins, as one line.
     **further
         Options of `palpate.learning.energy.learn_energy`, such as ``units_max``, ``target`` and ``networks``. Of a
-        pressed body also ``law``, a contact law that is taken as it is, or ``length``, a guess of the depth at which
-        pad and body cross, m; of a held one those of `palpate.learning.fit_pad`. Of one that loads bend ``settings`` of
-        the sequential filter and its ``passes`` over the data, five or as many as make 1,250 observations;
+        pressed body also ``law``, a contact law that is taken as it is, ``length``, a guess of the depth at which pad
+        and body cross, m, or ``deviation``, the largest relative deviation of the force that counts as trained where a
+        surface was pressed all over; of a held one those of `palpate.learning.fit_pad`. Of one that loads bend
+        ``settings`` of the sequential filter and its ``passes`` over the data, five or as many as make 1,250
+        observations;
         ``refinement``, by default of 26 solves and 6 units for one load, of all solves and more units for several; the
         stiffness ``coupling`` between hand and node, N/m, by default none for one touched load and four times the mean
         lateral stiffness for several; ``heldout``, unseen solves on which the filter's error is recorded; ``progress``,
@@ -164,6 +169,8 @@ def learn(
     first = limit(1.0 / (1.0 + _FIELD_SHARE * len(fields)))
     searches = vars(options) | {"seconds": first} | dict(known.options)
     energy, found = learn_energy(known.solves, known.baseline, **searches)
+    painted = None if known.region is None else known.region(energy)
+    energy = energy if painted is None else replace(energy, region=painted.region)
     learnt: dict[str, LearntField] = {}
     for i, shown in enumerate(fields):
         assert known.learn_field is not None
@@ -171,7 +178,9 @@ def learn(
         searches = vars(options) | {"seconds": limit(1.0 / (len(fields) - i))}
         learnt[shown] = known.learn_field(FieldOptions(name=shown, unit=_SHOWN[shown][1], **searches))
     origin = {"hash": train.ok.hash, "provenance": train.provenance}
-    meta = {**found.meta, **known.meta, "name": name, "dataset": origin}
+    # a region by the paint does not remember where it was solved; a validation asks for it
+    areas = {} if painted is None else {"painted": painted.record(), "solved_at": train.ok.X.tolist()}
+    meta = {**found.meta, **known.meta, **areas, "name": name, "dataset": origin}
     surrogate = Surrogate(energy, {**known.fields, **{k: v.field for k, v in learnt.items()}}, meta=meta)
     spent = time.monotonic() - began
     return surrogate, LearningHistory(found, solves, spent, learnt, known.filter)
@@ -249,7 +258,8 @@ def _recognise_pressed(
     elif length is not None:
         baseline = replace(baseline, law=ContactLaw("series", length))
     known = {"deepest": pressed.deepest or None}
-    return _Recognised(baseline, pressed.solves, known | options, learn_field)
+    region = partial(pressed.painted_region, deviation=options.pop("deviation", None))
+    return _Recognised(baseline, pressed.solves, known | options, learn_field, region)
 
 
 def _recognise_held(

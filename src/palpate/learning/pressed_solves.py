@@ -21,7 +21,8 @@ from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
 from palpate.learning.fields import Snapshots, lumped_mass
 from palpate.learning.kept_surface import touched_surface
-from palpate.surrogates import ContactBaseline, ContactLaw, Solves, TouchedSurface
+from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_region
+from palpate.surrogates import ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
 from palpate.surrogates.baselines import depth_series
 from palpate.units import Range
 
@@ -67,6 +68,9 @@ class PressedSolves:
     # depth at which a contact is as wide as an element, m; None for elements of the usual size
     resolved: float | None
     deepest: float  # depth that the solves were made to, m; 0 where the provenance does not tell
+    # corners (t, 3, 3) of the triangles of the surface that was to be pressed all over, and of all others, m; None
+    # where the presses keep a margin
+    painted: tuple[np.ndarray, np.ndarray] | None = None
     drawn: CarriedSurface | None = (
         None  # the body's own surface, of a file; its triangles are then in four parts
     )
@@ -85,7 +89,8 @@ class PressedSolves:
                 f"{count(len(data), 'converged solve')}: too few to learn a touched body from.",
                 fix=f"Sweep at least {FEWEST}, better 40 or more.",
             )
-        rest, triangles, touched = _surface(data, layout, str(probe["touches"]))
+        rim = probe.get("rim")
+        rest, triangles, touched, met = _surface(data, layout, str(probe["touches"]), rim)
         points, own = surface_nodes(rest, triangles, has_middles(data))
         drawn = None
         if has_middles(data):
@@ -104,7 +109,7 @@ class PressedSolves:
             touched_surface(
                 data,
                 rest,
-                touched,
+                triangles[met],
                 radius=largest,
                 inner=_inner(_deepest(probe), largest),
                 shoulder=SHOULDER * radius,
@@ -115,6 +120,7 @@ class PressedSolves:
             about,
             None if element is None else float(element) ** 2 / (2 * radius),
             _deepest(probe),
+            None if rim is None else (rest[triangles[touched]], rest[triangles[~touched]]),
             drawn,
         )
 
@@ -136,6 +142,22 @@ class PressedSolves:
     def depth_series(self) -> np.ndarray:
         """Number (N,) of each solve's depth series, whatever its further inputs are."""
         return depth_series(self.data.X[:, :3], self.surface, self.radius)
+
+    def painted_region(self, energy: LearntEnergy, deviation: float | None) -> PaintedRegion | None:
+        """Return the trained region of an energy of these solves by what was painted, None where nothing says that.
+
+        `deviation` is the largest relative deviation of the force that counts as trained, by default 7 %. A region of
+        mirror images, or of further inputs than the place, is that around the solves.
+        """
+        if self.painted is None or len(self.matrices) > 1 or len(self.inputs) > 3 or energy.root is None:
+            return None
+        return painted_region(
+            energy,
+            *self.painted,
+            radius=self.radius,
+            deepest=self.deepest,
+            deviation=deviation or DEVIATION,
+        )
 
     def snapshots(self, name: str, *, seed: int = 0, most: int = MOST) -> list[Snapshots]:
         """Return a field of all solves as they are and at their mirror images, each on its own nodes.
@@ -209,8 +231,10 @@ def _checked_probe(data: Dataset) -> Mapping[str, Any]:
     return probe
 
 
-def _surface(data: Dataset, layout: Layout | None, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes, all triangles, and those of the touched surface."""
+def _surface(
+    data: Dataset, layout: Layout | None, touches: str, rim: str | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the nodes, all triangles (t, 3), and which of these are touched and which the probe meets at all."""
     if layout is None:
         rest, triangles = data.rest, data.triangles
         surfaces, of = data["surface"].tolist(), data["surface_of"]
@@ -219,13 +243,18 @@ def _surface(data: Dataset, layout: Layout | None, name: str) -> tuple[np.ndarra
         assert layout.surface_of is not None
         rest, triangles, of = layout.rest, layout.triangles, layout.surface_of
         surfaces = list(layout.surfaces)
-    names = (name,) if name in surfaces else UPRIGHT if name == "side" else ()
-    touched = np.isin(of, [i for i, one in enumerate(surfaces) if one in names])
-    if not touched.any():
-        raise UsageError(
-            f"The mesh has no surface called {name!r}.", why=f"It has {', '.join(map(str, surfaces))}."
-        )
-    return rest, triangles, triangles[touched]
+
+    def on(name: str) -> np.ndarray:
+        names = (name,) if name in surfaces else UPRIGHT if name == "side" else ()
+        mine = np.isin(of, [i for i, one in enumerate(surfaces) if one in names])
+        if not mine.any():
+            raise UsageError(
+                f"The mesh has no surface called {name!r}.", why=f"It has {', '.join(map(str, surfaces))}."
+            )
+        return np.asarray(mine)
+
+    touched = on(touches)
+    return rest, triangles, touched, touched if rim is None else touched | on(rim)
 
 
 def _drawn(series: np.ndarray, images: int, most: int, seed: int) -> list[np.ndarray]:

@@ -101,6 +101,21 @@ class ProbeRecord(_OnSurface):
         "a margin of 3 radii",
         examples=[((0.03, 0.03), (0.07, 0.07))],
     )
+    rim: str | None = Field(
+        None,
+        description="surface around the touched one that the ball may meet too: with it all of the touched one is "
+        "pressed, without a margin",
+        examples=["rim"],
+    )
+
+    def fault(self, body: BodyRecord) -> str:
+        """Return what does not fit between the ball and the body; empty if all fits."""
+        if (fault := super().fault(body)) or self.rim is None:
+            return fault
+        known = body.surface_names()
+        if not members(self.rim, known):
+            return f"a {body.kind} has no surface {self.rim!r} to be the rim; it has {', '.join(known)}"
+        return f"the rim {self.rim!r} is held" if self.rim in body.fixed_names() else ""
 
     @model_validator(mode="after")
     def _in_order(self) -> ProbeRecord:
@@ -115,7 +130,13 @@ class ProbeRecord(_OnSurface):
     def build(self, body: Any, *, whole: bool = True) -> SphereProbe:
         """Return the probe: over all that it shall touch, or over the part that symmetry leaves to be solved."""
         probe = SphereProbe(
-            self.radius, touches=self.touches, pad=self.pad, stop=self.stop, depth=self.depth, over=self.over
+            self.radius,
+            touches=self.touches,
+            pad=self.pad,
+            stop=self.stop,
+            depth=self.depth,
+            over=self.over,
+            rim=self.rim,
         )
         return probe if whole else fundamental_part(body, probe)
 

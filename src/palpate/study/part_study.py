@@ -20,6 +20,7 @@ from palpate.physics.shapes.mesh import BodyMesh, Face
 from palpate.record_complaints import complaints
 from palpate.study.interaction_records import ProbeRecord
 from palpate.study.part_records import PartRecord, part_shape
+from palpate.study.part_rim import with_rim
 from palpate.study.study import Study
 from palpate.study.toml import to_toml
 
@@ -102,6 +103,7 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     study = _suit(study, content, element)
     if options.depth is None:
         study = _suit_depth(study)
+    study = with_rim(study)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
 

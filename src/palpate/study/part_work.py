@@ -216,7 +216,8 @@ def _figures(step: Any) -> dict[str, Any]:
         "before",
         "tried",
     )
-    return {name: getattr(step, name) for name in names} | {"places": step.places.tolist()}
+    painted = {} if step.surrogate is None else step.surrogate.meta.get("painted", {})
+    return {name: getattr(step, name) for name in names} | {"places": step.places.tolist()} | painted
 
 
 def _callbacks(say: Say) -> dict[str, Any]:

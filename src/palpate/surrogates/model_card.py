@@ -197,7 +197,10 @@ def _of_body(body: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
             *(f"{n} ({f.unit or '1'})" for n, f in body.fields.items()),
         ],
         "inside": str(body.energy),
-        "trained_on": {"corrected by touches": _record(correction.get("counts")).get("learnt")},
+        "trained_on": {
+            "corrected by touches": _record(correction.get("counts")).get("learnt"),
+            **_record(meta.get("painted")),
+        },
         "errors": _drop_empty(errors),
         "limits": tuple(_limits_of(body, meta)),
         "warnings": tuple(warnings),
@@ -252,6 +255,12 @@ def _limits_of(body: Any, meta: Mapping[str, Any]) -> list[str]:
         "The answers hold between the trained ends of every input; elsewhere they are continued and marked.",
         *_depths_of(body.energy),
     ]
+    if painted := _record(meta.get("painted")):
+        trained, whole = (1e4 * float(painted[name]) for name in ("trained_area", "painted_area"))
+        limits.append(
+            f"Of {whole:.3g} cm² of the surface that were to be touched, {trained:.3g} cm² are trained over the whole "
+            "depth, in the mean."
+        )
     if (part := pad_part_of(body.energy, meta)) is not None:
         limits.append(str(part))
     known = "say" if body.energy.root is not None else "do not say"

@@ -19,6 +19,7 @@ from palpate.learning import History
 from palpate.learning.bent_body import hand_coordinates
 from palpate.learning.learn_dataset import LearningHistory, filter_record
 from palpate.learning.plastic import LoadHistories
+from palpate.network import TrainedRegion
 from palpate.surrogates import LearntEnergy, NodeField, Surrogate
 from palpate.surrogates.fields.field_surrogate import FieldSurrogate
 from palpate.units import Range, bounds
@@ -101,7 +102,7 @@ def _by_place(
     function = TouchFunction.of(model)
     _refuse_radius(energy, test)
     solves = TouchSolves.of(test, function.inputs)
-    seen = _seen(energy, solves.X)
+    seen = _seen(model, solves.X)
     if seen.all():
         raise UsageError(
             f"The surrogate was trained on all {len(solves)} solves, or on mirror images of them.",
@@ -131,15 +132,23 @@ def _by_place(
     )
 
 
-def _seen(energy: LearntEnergy | None, X: np.ndarray) -> np.ndarray:
+def _seen(model: Any, X: np.ndarray) -> np.ndarray:
     """Return which of the inputs (N, n) a model was trained on.
 
-    A surrogate remembers its training inputs and their images under the body's symmetry, up to 512 of them.
+    A surrogate remembers its training inputs and their images under the body's symmetry, up to 512 of them; one that
+    was learnt all over a painted surface has them in its record.
     """
+    energy = model.energy if isinstance(model, Surrogate) else None
     if energy is None or energy.region is None:
         return np.zeros(len(X), dtype=bool)
     low, high = bounds(energy.inputs)
-    return np.asarray(energy.region.distances(2 * (X - low) / (high - low) - 1) < SEEN)
+
+    def scaled(places: np.ndarray) -> np.ndarray:
+        return np.asarray(2 * (places - low) / (high - low) - 1)
+
+    solved_at = model.meta.get("solved_at")
+    region = energy.region if solved_at is None else TrainedRegion(scaled(np.array(solved_at)), 0.0)
+    return np.asarray(region.distances(scaled(X)) < SEEN)
 
 
 def _refuse_radius(energy: LearntEnergy | None, data: Dataset | TouchSolves) -> None:

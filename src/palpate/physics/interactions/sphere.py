@@ -19,9 +19,10 @@ from palpate.physics.interactions.sphere_design import (
     group_into_chains,
     require_fit,
 )
+from palpate.physics.interactions.spread_places import depth_sequence, spread_places
 from palpate.physics.interactions.surface_patch import Patch, surface_of
 from palpate.physics.shapes.meshing import FineMesh
-from palpate.physics.shapes.naming import require_known
+from palpate.physics.shapes.naming import joint_name, require_known
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -74,6 +75,9 @@ class SphereProbe(PlainInteraction):
     over : tuple of two corners, optional
         Box of the contact points on the surface in m: ((x0, y0), (x1, y1)) or with z as well. By default the surface
         less a margin of 3 R, at most 0.4 of its width, in the directions along it.
+    rim : str, optional
+        Name of a surface around the touched one that the probe may meet too, at least as wide as the largest contact,
+        √(2 R d − d²) at the depth d. With it the contact points are all over the touched surface, without a margin.
 
     Raises
     ------
@@ -88,6 +92,7 @@ class SphereProbe(PlainInteraction):
     stop: float | None = 0.004
     depth: tuple[float, float] = (0.0, 0.015)
     over: tuple[Corner, Corner] | None = None
+    rim: str | None = None
 
     def __post_init__(self) -> None:
         checks.positive("The probe's radius", self.radius, "m")
@@ -99,14 +104,31 @@ class SphereProbe(PlainInteraction):
             object.__setattr__(self, "over", _checked_box(self.over))
 
     def __str__(self) -> str:
+        around = "" if self.rim is None else f" and its rim {self.rim!r}"
         stop = f" with a stop at {millimetres(self.stop)}" if self.stop is not None else " without a stop"
-        return f"sphere of radius {millimetres(self.radius)} on {self.touches!r}, pad {number(self.pad)} N/m³{stop}"
+        place = f"on {self.touches!r}{around}"
+        return f"sphere of radius {millimetres(self.radius)} {place}, pad {number(self.pad)} N/m³{stop}"
+
+    def describe(self) -> dict[str, Any]:
+        """Return everything that decides its energy, as plain data; a rim only where there is one."""
+        plain = super().describe()
+        return {name: value for name, value in plain.items() if name != "rim" or value is not None}
+
+    @property
+    def meets(self) -> str:
+        """The joint name of the surfaces that it may meet: the touched one and its rim."""
+        return joint_name(self.touches, self.rim)
 
     def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
         """Return the ranges of c_x, c_y and c_z in m: the box around all its positions."""
-        patch = self._patch(geometry)
-        require_fit(patch, geometry.rest().points, self.over, max(self.depth), END * self.radius)
-        contacts, normals, _ = self._contact_points(patch, _GRID)
+        if self.rim is None:
+            patch = self._patch(geometry)
+            require_fit(patch, geometry.rest().points, self.over, max(self.depth), END * self.radius)
+            contacts, normals, _ = self._contact_points(patch, _GRID)
+        else:  # the corners of all triangles that are pressed
+            painted = self._painted(geometry)
+            corners = np.unique(painted.triangles)
+            contacts, normals = painted.points[corners], painted.node_normals[corners]
         ends = [contacts + normals * (self.radius - d) for d in self.depth]
         low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)
         pairs = zip("xyz", low.tolist(), high.tolist(), strict=True)
@@ -118,7 +140,7 @@ class SphereProbe(PlainInteraction):
         low, high = self._box(patch)
         low, high = low - MARGIN * self.radius, high + MARGIN * self.radius
         element = _element(geometry, patch) * self.radius
-        return (FineMesh(self.touches, element, tuple(low.tolist()), tuple(high.tolist())),)
+        return (FineMesh(self.meets, element, tuple(low.tolist()), tuple(high.tolist())),)
 
     def design(self, geometry: Geometry, samples: int, seed: int, depths: int | None = None) -> np.ndarray:
         """Return positions (samples, 3) in m in depth series, each from shallow to deep.
@@ -126,10 +148,15 @@ class SphereProbe(PlainInteraction):
         The contact points are a scrambled Sobol sequence (Sobol 1967; Owen 1998) over the touched part of the
         surface, denser towards sides where the surface ends; the depths of a series are evenly spaced, all shifted by a
         random share of their distance. `depths` is their number in a series, by default about ¾ √samples.
+
+        With a rim the contact points are far from each other all over the touched surface, so that any first few are
+        spread (see `spread_places`); of one depth each, the depths are a golden sequence.
         """
+        count = depths_per_series(samples) if depths is None else depths
+        if self.rim is not None:
+            return self._spread_design(geometry, samples, seed, count)
         from scipy.stats import qmc
 
-        count = depths_per_series(samples) if depths is None else depths
         number = -(-samples // count)
         engine = qmc.Sobol(3, scramble=True, rng=np.random.default_rng(seed))
         unit, contacts = np.empty((0, 3)), np.empty((0, 3))
@@ -139,6 +166,27 @@ class SphereProbe(PlainInteraction):
         lines = zip(contacts[:number], normals, unit[hit, 2], strict=False)
         points = [self._series(contact, normal, count, shift) for contact, normal, shift in lines]
         return np.concatenate(points)[:samples]
+
+    def _spread_design(self, geometry: Geometry, samples: int, seed: int, count: int) -> np.ndarray:
+        """Return positions (samples, 3) in m over places that are far from each other."""
+        number = -(-samples // count)
+        contacts, normals = spread_places(self._painted(geometry), number, seed)
+        width = (self.depth[1] - self.depth[0]) / count
+        first = depth_sequence((self.depth[0], self.depth[0] + width), number, seed)
+        depths = first[:, None] + width * np.arange(count)
+        points = contacts[:, None] + (self.radius - depths)[:, :, None] * normals[:, None]
+        return np.asarray(points.reshape(-1, 3)[:samples])
+
+    def random_presses(self, geometry: Geometry, samples: int, seed: int) -> np.ndarray:
+        """Return positions (samples, 3) in m, independent of each other, even over the touched area and all depths.
+
+        They judge a surrogate by what was to be touched, margin and rim of its design aside.
+        """
+        rng = np.random.default_rng(seed)
+        touched = surface_of(geometry, self.touches, self.refinements(geometry))
+        contacts, normals = touched.spread_with_normals(rng.random((samples, 2)))
+        depths = rng.uniform(*self.depth, samples)
+        return np.asarray(contacts + (self.radius - depths)[:, None] * normals)
 
     def chains(self, geometry: Geometry, points: np.ndarray) -> list[np.ndarray]:
         """Return rows of positions (N, 3) in chains: depth series, else neighbours, from shallow to deep."""
@@ -163,7 +211,7 @@ class SphereProbe(PlainInteraction):
 
         from palpate.physics.interactions.sphere_contact import Contact, pad_energy
 
-        contact = Contact(field, field.rest, self.touches, self.radius, self.stop)
+        contact = Contact(field, field.rest, self.meets, self.radius, self.stop)
         centre = tuple(ngsolve.Parameter(0.0) for _ in range(3))
         penetration = contact.penetration(field.trial, ngsolve.CF(centre))
         energy = Energy(pad_energy(penetration, self.pad, self.stop), contact.measure())
@@ -183,11 +231,18 @@ class SphereProbe(PlainInteraction):
         return float(min(FIRST * self.radius, pressed, FIRST_DEPTH * max(map(abs, self.depth))))
 
     def _surface(self, geometry: Geometry) -> str:
-        require_known("surface", self.touches, geometry.surfaces)
+        for name in (self.touches, *([] if self.rim is None else [self.rim])):
+            require_known("surface", name, geometry.surfaces)
         return self.touches
 
     def _patch(self, geometry: Geometry) -> Patch:
-        return surface_of(geometry, self.touches, self.refinements(geometry))
+        """Return the surface that it may meet."""
+        return surface_of(geometry, self.meets, self.refinements(geometry))
+
+    def _painted(self, geometry: Geometry) -> Patch:
+        """Return the surface that is pressed, with a rim: the touched one, or its part in a given box."""
+        painted = surface_of(geometry, self.touches, self.refinements(geometry))
+        return painted if self.over is None else _within(painted, *self._box(painted))
 
     def _box(self, patch: Patch) -> tuple[np.ndarray, np.ndarray]:
         """Return the lower and upper corner (3,) in m of the box of contact points."""
@@ -195,6 +250,7 @@ class SphereProbe(PlainInteraction):
         if self.over is not None:
             for axis, (a, b) in enumerate(zip(*self.over, strict=True)):
                 low[axis], high[axis] = a, b
+        if self.over is not None or self.rim is not None:
             return low, high
         # along the surface only: a closed one faces nowhere in the mean and has no rim
         along = (np.abs(patch.facing) < 0.5 * np.linalg.norm(patch.facing)) & _is_open(patch)
@@ -243,7 +299,7 @@ class _Approach:
         """The touched surface under the constant loads alone."""
         if self._known is None:
             displacement = self._field.at_nodes(self._field.base)
-            self._known = Patch.from_mesh(self._field.rest, self._probe.touches, displacement)
+            self._known = Patch.from_mesh(self._field.rest, self._probe.meets, displacement)
         return self._known
 
     def __call__(self, centre: np.ndarray) -> np.ndarray | None:

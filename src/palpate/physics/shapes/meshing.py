@@ -18,7 +18,7 @@ import numpy as np
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.physics.shapes.mesh import BodyMesh, body_mesh
-from palpate.physics.shapes.naming import GROUPS, members
+from palpate.physics.shapes.naming import AND, GROUPS, members
 
 __all__ = [
     "GRADING",
@@ -88,7 +88,7 @@ class FineMesh:
 
     def is_on(self, name: str | None) -> bool:
         """Return True for the refined surface, and for those that its name stands for."""
-        return name == self.surface or name in GROUPS.get(self.surface, ())
+        return any(name == part or name in GROUPS.get(part, ()) for part in self.surface.split(AND))
 
 
 def require_budget(volumes: Iterable[tuple[float, float]], fine: Iterable[tuple[float, float]]) -> None:

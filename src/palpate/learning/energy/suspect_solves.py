@@ -188,5 +188,5 @@ def _describe(samples: EnergySamples, row: int, error: np.ndarray) -> SuspectSol
     force = samples.force[row, :k]
     # F = −E ∇ ln E: the expected force has the expected energy and the expected slope
     expected = (force + samples.energy[row] * error[1 : 1 + k] / samples.half[:k]) / ratio
-    off = float(np.linalg.norm(force - expected) / max(np.linalg.norm(force), 1e-300))
+    off = float(np.linalg.norm(force - expected)) / max(float(np.linalg.norm(force)), 1e-300)
     return SuspectSolve(int(samples.numbers[row]), ratio, off)

@@ -403,4 +403,11 @@ class PartOptions(Options):
         (), "surface of the file that is held. Several times. Default: what it stands on"
     )
     touched: str | None = option(None, "surface of the file that is touched. Default: what faces up")
+    wrap: float | None = option(
+        None,
+        "size by which a closed surface is laid around one that cuts itself or has holes. Default: none",
+        "m",
+        above=0,
+        bare=False,
+    )
     name: str | None = option(None, "name of the study and of its files. Default: that of the part")

@@ -151,6 +151,10 @@ def learn(
         float | None,
         number_option("--effort", least=0.01, help="Of a dataset: how much is tried; 0.1 is a quick look."),
     ] = None,
+    leave_out: Annotated[
+        list[int] | None,
+        typer.Option(help="Number of a solve that is not learnt from, as learning names it. Several times."),
+    ] = None,
     watch: Annotated[
         bool,
         typer.Option(
@@ -164,7 +168,7 @@ def learn(
     """Learn a surrogate from the solves of a study, check it, and write it to a model file."""
     from palpate.cli.study_commands import learn_path
 
-    learn_path(study, effort, Console(as_json), watch=watch)
+    learn_path(study, effort, Console(as_json), watch=watch, leave_out=tuple(leave_out or ()))
 
 
 @app.command()

@@ -23,6 +23,7 @@ _KEYS = {
     "depth": ("interaction", "depth"),
     "held": ("body", "fixed"),
     "touched": ("interaction", "touches"),
+    "wrap": ("body", "wrap"),
 }
 """Key of a study file that says each option of a part."""
 
@@ -90,7 +91,7 @@ def _choices_of(study: Study) -> dict[str, Any]:
     if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord):
         return {}
     said: dict[str, Any] = {"radius": acting.radius, "depth": acting.depth[1], "touched": acting.touches}
-    said |= {"unit": body.unit, "held": body.fixed_names()}
+    said |= {"wrap": body.wrap, "unit": body.unit, "held": body.fixed_names()}
     if isinstance(body.material, str):
         said["material"] = body.material
     elif isinstance(body.material, SolidMaterialRecord):

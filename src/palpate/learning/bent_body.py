@@ -73,6 +73,7 @@ class BentSolves:
     ]  # displacements of all nodes, of those asked for, and the filter's answer for these
     meta: dict[str, Any]
     filter: Learned  # the sequential filter's network, with its history
+    rows: np.ndarray  # (N,), converged solve that each one is; negative for the state without load
 
     @classmethod
     def of(
@@ -120,7 +121,7 @@ class BentSolves:
         }
         several = len(few.ranges) > 1
         options = _NOISELESS | {"units_max": _UNITS[several], "effort": search.effort * _EFFORT[several]}
-        return cls(baseline, solves, options, fields, meta, sequential)
+        return cls(baseline, solves, options, fields, meta, sequential, _rows_of(few, train.ok))
 
 
 def _refuse_unfit(good: Dataset) -> None:
@@ -192,6 +193,12 @@ def _spread_rows(data: Dataset, count: int) -> Dataset:
     order = np.argsort(data.X[:, 0], kind="stable")
     share = (1.0 - np.cos(np.pi * np.linspace(0.0, 1.0, count))) / 2.0
     return data.take(order[np.unique(np.round(share * (len(data) - 1)).astype(int))])
+
+
+def _rows_of(some: Dataset, data: Dataset) -> np.ndarray:
+    """Return which row of a dataset has the inputs of each of some solves; negative where none has."""
+    same = (some.X[:, None] == data.X[None]).all(axis=2)
+    return np.where(same.any(axis=1), same.argmax(axis=1), -1)
 
 
 def _with_rest(data: Dataset) -> Dataset:

@@ -6,16 +6,19 @@ What a dataset is of is asked once, here: of the recognisers of palpate, and of 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
+from palpate import checks
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
 from palpate.format import count, share
 from palpate.learning.bent_body import BentSolves
-from palpate.learning.energy import EnergyHistory, learn_energy
+from palpate.learning.energy import EnergyHistory, SuspectSolve, learn_energy
 from palpate.learning.fields import LearntField, learn_snapshots, lumped_mass
 from palpate.learning.learning_history import History
 from palpate.learning.pad_fit import fit_pad
@@ -26,6 +29,7 @@ from palpate.learning.search import Budget
 from palpate.options import FieldOptions, SearchOptions, takes
 from palpate.surrogates import Baseline, ContactLaw, LearntEnergy, Solves, Surrogate
 from palpate.surrogates.baselines import registered_baselines
+from palpate.surrogates.model_card import suspect_sentences
 
 __all__ = ["LearningHistory", "filter_record", "learn"]
 
@@ -61,6 +65,11 @@ class LearningHistory:
     fields: Mapping[str, LearntField] = field(default_factory=dict)
     filter: History | None = None
 
+    @property
+    def suspects(self) -> tuple[SuspectSolve, ...]:
+        """Solves that contradict their neighbours, by their rows of the dataset."""
+        return self.energy.suspects
+
     def __str__(self) -> str:
         tried = len(self.energy.trials)
         words = f"{self.solves} solves, {tried} networks of the energy tried in {self.seconds:.0f} s"
@@ -76,7 +85,7 @@ class LearningHistory:
                 f"{1e3 * missed:.2g} mm" if learnt.field.unit == "m" else f"{missed:.2g} {learnt.field.unit}"
             )
             words += f"; {_SHOWN[name][0]}: {learnt.field.meta['modes']} modes, which miss {size}"
-        return words
+        return "\n".join([words, *suspect_sentences(self.suspects)])
 
     __repr__ = __str__
 
@@ -99,6 +108,9 @@ class _Recognised:
     fields: Mapping[str, Any] = field(default_factory=dict)  # that are learnt already
     meta: Mapping[str, Any] = field(default_factory=dict)
     filter: History | None = None
+    rows: np.ndarray | None = (
+        None  # converged solve that each of `solves` is, negative for none; None: in order
+    )
 
 
 @takes(SearchOptions)
@@ -108,6 +120,7 @@ def learn(
     name: str = "body",
     layout: Layout | None = None,
     shape: bool = True,
+    leave_out: Sequence[int] = (),
     log: Log = lambda _: None,
     options: SearchOptions,
     **further: Any,
@@ -124,6 +137,9 @@ def learn(
         Of a mesh that is fine wherever the body shall be touched, where the sweep's is fine in a part only.
     shape : bool
         Whether to learn the displacement of the surface too, and the stress there if it is in the dataset.
+    leave_out : sequence of int
+        Rows of the dataset, from 0, that are not learnt from: solves which the history names as contradicting their
+        neighbours, for example.
     log : callable
         Told what begins, as one line.
     **further
@@ -148,7 +164,8 @@ def learn(
     Raises
     ------
     UsageError
-        If no baseline recognises the data, it lacks energies, or has too few solves or none in contact.
+        If no baseline recognises the data, it lacks energies, has too few solves or none in contact, or lacks a row
+        that is to be left out.
     """
     if not isinstance(train, Dataset):
         raise UsageError(
@@ -157,7 +174,9 @@ def learn(
             fix="Pass what `palpate.sweep` returns; for arrays X and Y use `palpate.fit`.",
         )
     budget, began = Budget.of(options.effort, options.seconds), time.monotonic()
-    solves = len(train.ok)
+    origin = {"hash": train.ok.hash, "provenance": train.provenance}
+    numbers, excluded = _kept_rows(train, leave_out)
+    train, solves = train.take(numbers), len(numbers)
     log(f"energy of {count(solves, 'solve')}")
     known = _recognise(train, layout, options, further)
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
@@ -177,13 +196,26 @@ def learn(
         log("shape" if shown == "displacement" else "stress")
         searches = vars(options) | {"seconds": limit(1.0 / (len(fields) - i))}
         learnt[shown] = known.learn_field(FieldOptions(name=shown, unit=_SHOWN[shown][1], **searches))
-    origin = {"hash": train.ok.hash, "provenance": train.provenance}
     # a region by the paint does not remember where it was solved; a validation asks for it
     areas = {} if painted is None else {"painted": painted.record(), "solved_at": train.ok.X.tolist()}
+    rows = np.arange(solves) if known.rows is None else known.rows
+    found = found.numbered(np.where(rows < 0, -1, numbers[rows]))
     meta = {**found.meta, **known.meta, **areas, "name": name, "dataset": origin}
+    if found.suspects:
+        meta["suspects"] = [vars(one) for one in found.suspects]
+    if excluded:
+        meta["excluded"] = excluded
     surrogate = Surrogate(energy, {**known.fields, **{k: v.field for k, v in learnt.items()}}, meta=meta)
     spent = time.monotonic() - began
     return surrogate, LearningHistory(found, solves, spent, learnt, known.filter)
+
+
+def _kept_rows(train: Dataset, leave_out: Sequence[int]) -> tuple[np.ndarray, list[int]]:
+    """Return the converged rows of a dataset without those to be left out, and the numbers of the latter."""
+    for row in leave_out:
+        checks.fits("The number of a solve that is left out", row, least=0, most=len(train) - 1, whole=True)
+    excluded = sorted({int(row) for row in leave_out})
+    return np.setdiff1d(np.flatnonzero(train.converged), excluded), excluded
 
 
 def _recognise(
@@ -216,7 +248,7 @@ def _recognise_bent(
     own = _take(options, "heldout", "settings", "refinement", "passes", "coupling", "progress", "watch")
     bent = BentSolves.of(train, search, **own)
     context: dict[str, Any] = {"fields": bent.fields, "meta": bent.meta, "filter": bent.filter.history}
-    return _Recognised(bent.baseline, bent.solves, bent.options | options, **context)
+    return _Recognised(bent.baseline, bent.solves, bent.options | options, rows=bent.rows, **context)
 
 
 def _recognise_registered(

@@ -163,6 +163,12 @@ class PartRecord(Record):
         description=f"surfaces: from which angle on an edge is sharp, degrees; left out: {FEATURE_ANGLE:g}",
         examples=[FEATURE_ANGLE],
     )
+    wrap: Metres | None = Field(
+        None,
+        gt=0,
+        description="surfaces that cut themselves or have holes: a closed one is laid around, so far away at most",
+        examples=["1 mm"],
+    )
     material: SolidMaterial | None = Field(
         None, description="of each region that `materials` doesn't name", examples=["ecoflex 00-30"]
     )
@@ -186,6 +192,8 @@ class PartRecord(Record):
             raise ValueError(f"{self.file} is a mesh and keeps its elements: leave out element")
         if self.feature_angle is not None and kind != "surface":
             raise ValueError("feature_angle is for surfaces, such as STL files")
+        if self.wrap is not None and kind != "surface":
+            raise ValueError("wrap is for surfaces, such as STL files")
         regions = self.shape().regions  # its errors say more than a line of a list
         for region in self.materials:
             if region not in regions:
@@ -213,11 +221,11 @@ class PartRecord(Record):
     def shape(self) -> ImportedSolid | ImportedMesh:
         """Return the shape, with names for parts of its surface."""
         patches = self.patches()
-        return part_shape(self.file, self.unit, self.element, self.feature_angle, patches)
+        return part_shape(self.file, self.unit, self.element, self.feature_angle, patches, self.wrap)
 
     def bare(self) -> ImportedSolid | ImportedMesh:
         """Return the shape with the names of its file alone."""
-        return part_shape(self.file, self.unit, self.element, self.feature_angle)
+        return part_shape(self.file, self.unit, self.element, self.feature_angle, wrap=self.wrap)
 
     def patches(self) -> tuple[SurfacePatch, ...]:
         """Return the names for parts of the surface, in the order in which they are given: later ones go over."""
@@ -245,14 +253,15 @@ def part_shape(
     element: float | None = None,
     feature_angle: float | None = None,
     patches: tuple[SurfacePatch, ...] = (),
+    wrap: float | None = None,
 ) -> ImportedSolid | ImportedMesh:
     """Return the shape of a part's file: a solid of CAD or a surface, else a volume mesh.
 
     STEP and IGES files state the unit of their numbers, a mesh is in m by default. `element` is the largest element in
     m, of a solid or a surface; `feature_angle` is in degrees, from which on an edge of a surface is sharp. The patches
-    are names for parts of the surface.
+    are names for parts of the surface; `wrap` is the size in m by which a surface is wrapped.
     """
     if part_kind(file) not in ("cad", "surface"):
         return ImportedMesh(file, unit or "m", patches)
     angle = FEATURE_ANGLE if feature_angle is None else feature_angle
-    return ImportedSolid(file, unit, element, patches, angle)
+    return ImportedSolid(file, unit, element, patches, angle, wrap=wrap)

@@ -67,7 +67,7 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
             why=f"Its name ends in {part_ending(path) or 'nothing'}.",
             fix=f"Give {PART_FORMATS}. {way_for(path)}".strip(),
         )
-    unit, faces = _read(path, options.unit)
+    unit, faces = _read(path, options.unit, options.wrap)
     low = np.min([face.lower for face in faces], axis=0)
     high = np.max([face.upper for face in faces], axis=0)
     footprint = float(np.prod((high - low)[:2]))
@@ -86,6 +86,7 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
             "kind": "part",
             "file": str(path),
             "unit": unit,
+            "wrap": options.wrap,
             "material": _material(options),
             "fixed": fixed,
             "surfaces": named,
@@ -200,15 +201,15 @@ def part_text(study: Study, notes: Iterable[str]) -> str:
     return to_toml(study.model_copy(update={"body": body}), notes)
 
 
-def _read(path: Path, unit: str | None) -> tuple[str | None, Sequence[Face]]:
+def _read(path: Path, unit: str | None, wrap: float | None) -> tuple[str | None, Sequence[Face]]:
     """Return the unit, and the faces of the part."""
     if unit is not None or states_unit(path):
-        return unit, part_shape(str(path), unit).faces
+        return unit, part_shape(str(path), unit, wrap=wrap).faces
     try:
-        faces = part_shape(str(path), "mm").faces
+        faces = part_shape(str(path), "mm", wrap=wrap).faces
     except UsageError as error:
         try:
-            return "m", part_shape(str(path), "m").faces
+            return "m", part_shape(str(path), "m", wrap=wrap).faces
         except PalpateError:
             raise error from None
     low = np.min([face.lower for face in faces], axis=0)

@@ -212,11 +212,13 @@ def learn_study(
     progress: Callable[[int, int], None] | None = None,
     log: Log = lambda _: None,
     watch: Any = None,
+    leave_out: Sequence[int] = (),
 ) -> tuple[Any, Any]:
     """Learn the study's surrogate, which keeps the study's runtime settings.
 
     Rows of `test` are only watched while a filter learns; `progress` counts its observations, and `watch` (a
-    GrowthRecorder) keeps frames of a sequential filter's growth. Returns what `palpate.learn` returns, and for a
+    GrowthRecorder) keeps frames of a sequential filter's growth. Rows of `train` numbered in `leave_out` are not learnt
+    from. Returns what `palpate.learn` returns, and for a
     body with memory how well it fits.
     """
     if watch is not None and (study.filter is None or not isinstance(train, Dataset)):
@@ -227,8 +229,13 @@ def learn_study(
         )
     if isinstance(train, Dataset):
         options = _options(study, train, test, progress, log) | ({} if watch is None else {"watch": watch})
-        model, history = learn_dataset(train, **options)
+        model, history = learn_dataset(train, leave_out=leave_out, **options)
         model = with_relaxation(study, model, log)
+    elif leave_out:
+        raise UsageError(
+            f"The study {study.name!r} learns from histories, of which none can be left out.",
+            fix="Omit --leave-out.",
+        )
     else:
         model, history = learn_histories(study, train)
     return _with_meta(model, {"runtime": study.runtime.model_dump()}), history

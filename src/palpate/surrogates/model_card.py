@@ -16,13 +16,13 @@ from pathlib import Path
 from typing import Any
 
 from palpate.errors import UsageError
-from palpate.format import count, millimetres
+from palpate.format import count, millimetres, share
 from palpate.input_words import input_in_words
 from palpate.surrogates.card_text import bullets, escape_markdown, html_page, html_record, rows
 from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.units import Range
 
-__all__ = ["FORMAT_VERSION", "NOT_STATED", "ModelCard", "card_of"]
+__all__ = ["FORMAT_VERSION", "NOT_STATED", "ModelCard", "card_of", "suspect_sentences"]
 
 FORMAT_VERSION = 1  # version of the card's own layout
 NOT_STATED = "not stated"
@@ -189,6 +189,7 @@ def _of_body(body: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
     if caution := _record(validation).get("caution"):
         warnings.append(str(caution))
         errors["unseen solves"] = {k: v for k, v in _record(validation).items() if k != "caution"}
+    warnings += suspect_sentences(meta.get("suspects", ()))
     return {
         "kind": f"A learnt body: {body.purpose}.",
         "inputs": body.inputs,
@@ -200,11 +201,26 @@ def _of_body(body: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
         "trained_on": {
             "corrected by touches": _record(correction.get("counts")).get("learnt"),
             **_record(meta.get("painted")),
+            "rows of the dataset left out on request": ", ".join(map(str, meta.get("excluded", ()))),
         },
         "errors": _drop_empty(errors),
         "limits": tuple(_limits_of(body, meta)),
         "warnings": tuple(warnings),
     }
+
+
+def suspect_sentences(suspects: Sequence[Any]) -> list[str]:
+    """Return sentences on solves that contradict their neighbours, records or mappings of them."""
+    entries = [one if isinstance(one, Mapping) else vars(one) for one in suspects]
+    sentences = [
+        f"Solve {one['solve']} contradicts its neighbours: its energy is {one['energy']:.2g} times what they say, its "
+        f"force is off by {share(one['force'])}."
+        for one in entries
+    ]
+    if sentences:
+        options = " ".join(f"--leave-out {one['solve']}" for one in entries)
+        sentences.append(f"Solve again, or learn without: palpate learn {options}.")
+    return sentences
 
 
 def _of_network(network: Any, meta: Mapping[str, Any]) -> dict[str, Any]:

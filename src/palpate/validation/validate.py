@@ -12,6 +12,7 @@ from palpate.format import count, criterion_figure
 from palpate.learning import History
 from palpate.learning.learn_dataset import LearningHistory
 from palpate.output_files import json_data
+from palpate.surrogates.model_card import suspect_sentences
 from palpate.validation.figures import FIGURES
 from palpate.validation.figures.figure import Figure
 from palpate.validation.limits import CRITERIA, Check, Limits
@@ -208,9 +209,11 @@ def validate(
     UsageError
         If the solves are of another body, or of no use as a test.
     """
-    return measure(
+    result = measure(
         Subject.of(model, test, history=history, refined=refined, strokes=strokes, seed=seed), limits
     )
+    suspects = suspect_sentences((getattr(model, "meta", None) or {}).get("suspects", ()))
+    return replace(result, notes=(*result.notes, *suspects))
 
 
 def measure(subject: Subject, limits: Limits | None = None) -> Validation:

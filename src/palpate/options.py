@@ -399,6 +399,11 @@ class PartOptions(Options):
         above=0,
         bare=False,
     )
+    element: str | None = option(
+        None,
+        "size of elements under the ball, such as 3 mm; or auto: smaller ones where finer solves show that it pays. "
+        "Default: by the part's size",
+    )
     held: tuple[str, ...] = option(
         (), "surface of the file that is held. Several times. Default: what it stands on"
     )

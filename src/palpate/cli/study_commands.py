@@ -138,6 +138,7 @@ def learn_file(study: Path, console: Console, *, watch: bool = False, leave_out:
     """
     from palpate.cli.growth_view import watch_growth
     from palpate.study import read_study
+    from palpate.study.mesh_check import load_finer
     from palpate.study.run import Paths, learn_study, load_data, save_model, validate_study, with_validation
     from palpate.study.study_advice import earlier_curve
 
@@ -156,7 +157,7 @@ def learn_file(study: Path, console: Console, *, watch: bool = False, leave_out:
             watch=recorder,
             leave_out=leave_out,
         )
-    validation = validate_study(record, model, test, history)
+    validation = validate_study(record, model, test, history, load_finer(record, paths))
     curve = earlier_curve(paths, record.name)
     model = with_validation(model, validation, curve, len(train) if record.memory is None else 0)
     save_model(paths, model, history)
@@ -187,6 +188,7 @@ def validate_study_file(study: Path, report: bool, console: Console, traces: Seq
     `AccuracyError` tells after everything has been printed and written.
     """
     from palpate.study import read_study
+    from palpate.study.mesh_check import load_finer
     from palpate.study.run import Outcome, Paths, load_data, load_model, report_study, validate_study
     from palpate.study.study_advice import advice_after
     from palpate.validation.report.body_words import solid_words
@@ -196,7 +198,7 @@ def validate_study_file(study: Path, report: bool, console: Console, traces: Seq
     paths = Paths(study.parent, record.name)
     train, test = load_data(record, paths)
     model, history = load_model(paths, train)
-    validation = validate_study(record, model, test, history)
+    validation = validate_study(record, model, test, history, load_finer(record, paths))
     advice = advice_after(record, model, train, validation, study)
     if advice:
         validation = replace(validation, notes=(f"{advice}.", *validation.notes))

@@ -97,6 +97,8 @@ class ImprovementStep:
         Why the improvement has ended; empty before.
     model_path : Path or None
         File of the surrogate, where there is one.
+    mesh : float
+        The mesh's part in the relative force error, beside `error`; not-a-number where no finer mesh was solved.
     """
 
     phase: str
@@ -115,6 +117,7 @@ class ImprovementStep:
     reached: bool = False
     reason: str = ""
     model_path: Path | None = None
+    mesh: float = math.nan
     before: float = math.nan
     tried: float = math.nan
 

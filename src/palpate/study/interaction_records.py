@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeAlias
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from palpate.physics import GluedPad, PointLoad, SphereProbe
+from palpate.physics.interactions.sphere import RIGID
 from palpate.physics.shapes.naming import members
 from palpate.physics.solid.body_family import BESIDE, UNITS
 from palpate.physics.solid.body_symmetry import fundamental_part
@@ -92,8 +93,12 @@ class ProbeRecord(_OnSurface):
 
     kind: Literal["probe"] = "probe"
     radius: Metres = Field(0.010, gt=0, description="of the ball")
-    pad: PadStiffness = Field(2e6, gt=0, description="stiffness of the pad")
-    stop: Metres = Field(0.004, gt=0, description="penetration at which the pad is fully pressed")
+    pad: PadStiffness | Literal["rigid"] = Field(
+        2e6, description='stiffness of the pad; "rigid" for a ball without one that is felt'
+    )
+    stop: Metres = Field(
+        0.004, gt=0, description="penetration at which the pad is fully pressed; a rigid ball has none"
+    )
     depth: Pair = Field((2e-4, 0.012), description="least and largest depth of the ball's tip, m")
     over: tuple[Pair, Pair] | tuple[Triple, Triple] | None = Field(
         None,
@@ -116,6 +121,17 @@ class ProbeRecord(_OnSurface):
         if not members(self.rim, known):
             return f"a {body.kind} has no surface {self.rim!r} to be the rim; it has {', '.join(known)}"
         return f"the rim {self.rim!r} is held" if self.rim in body.fixed_names() else ""
+
+    @field_validator("pad", mode="before")
+    @classmethod
+    def _stiffness_or_rigid(cls, pad: Any) -> Any:
+        """Return the word of a rigid ball, or a positive stiffness in N/m³."""
+        if isinstance(pad, str) and pad.strip().lower() == RIGID:
+            return RIGID
+        stiffness = in_si(pad, "N/m^3")
+        if not stiffness > 0:
+            raise ValueError(f'{stiffness:g} is no stiffness of a pad: give one above 0, or "rigid"')
+        return stiffness
 
     @model_validator(mode="after")
     def _in_order(self) -> ProbeRecord:

@@ -23,10 +23,12 @@ from palpate.study.part_records import PartRecord, part_shape
 from palpate.study.part_rim import with_rim
 from palpate.study.study import Study
 from palpate.study.toml import to_toml
+from palpate.units import parse_quantity
 
-__all__ = ["part_study", "part_text", "study_file", "study_name"]
+__all__ = ["AUTO", "part_study", "part_text", "study_file", "study_name"]
 
 HELD, TOUCHED = "held", "touched"
+AUTO = "auto"  # size of elements that finer solves decide
 YOUNG, POISSON = 10e3, 0.45  # Pa; of soft tissue, until the user says what it is
 SMALL = 5e-3  # m: a part that would be smaller in mm may have been drawn in m
 # length of a plane's mean normal, and share of the height within which it is lowest
@@ -76,6 +78,8 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
         least = float((high - low).min())
         radius = _nice(min(max(RADIUS * least, math.sqrt(footprint / CELLS) / COARSE), LARGEST * least))
     element = _nice(min(math.sqrt(footprint / CELLS), COARSE * radius))
+    if options.element not in {None, AUTO}:
+        element = parse_quantity(options.element, "m", "--element", bare=False)
     deepest = _nice(DEPTH * radius) if options.depth is None else options.depth
     fixed, named = _support(faces, float(low[2]), float(high[2] - low[2]))
     if options.held:

@@ -28,6 +28,7 @@ from palpate.learning.learn_dataset import filter_record
 from palpate.learning.plastic import LoadHistories
 from palpate.processes import CASE_LIMIT
 from palpate.study.memory_stages import learn_histories, sweep_histories
+from palpate.study.mesh_check import load_finer, solve_finer
 from palpate.study.relaxation_stage import with_relaxation
 from palpate.study.study import Study
 from palpate.study.study_paths import Paths
@@ -135,6 +136,8 @@ def sweep_study(
         unseen = grow(paths.random, problem, further) if paths else None
         if unseen is None:
             unseen = sweep(problem, path=paths.random if paths else None, **further, **common)
+        if paths is not None:
+            solve_finer(study, paths, unseen, log=log, **common)
         return data, unseen
 
 
@@ -259,10 +262,15 @@ def _with_meta(model: Any, more: Mapping[str, Any]) -> Any:
     return replace(model, meta={**model.meta, **more})
 
 
-def validate_study(study: Study, model: Any, test: Rows, history: Any = None) -> Validation:
-    """Judge what was learnt by solves that it has never seen, by the study's targets."""
+def validate_study(
+    study: Study, model: Any, test: Rows, history: Any = None, finer: Dataset | None = None
+) -> Validation:
+    """Judge what was learnt by solves that it has never seen, by the study's targets.
+
+    `finer` are some of them on finer elements, which tell the mesh's part in the error.
+    """
     assert study.target is not None  # every kind of study has one
-    return validate(model, test, history=filter_record(history), limits=study.target.limits())
+    return validate(model, test, history=filter_record(history), refined=finer, limits=study.target.limits())
 
 
 def with_validation(
@@ -348,7 +356,8 @@ def carry_out(
     data, further = timed("sweep", lambda: sweep_study(study, paths, **sweeping))
     train, test = split_rows(study, data, further)
     model, history = timed("learn and refine", lambda: learn_study(study, train, test))
-    validation = timed("validate", lambda: validate_study(study, model, test, history))
+    finer = load_finer(study, paths)
+    validation = timed("validate", lambda: validate_study(study, model, test, history, finer))
     model = with_validation(model, validation)
     save_model(paths, model, history)
     others: dict[str, Any] = {}

@@ -81,6 +81,18 @@ class Validation:
         return tuple(c for c in self.checks if not c.passed)
 
     @property
+    def mesh_part(self) -> float | None:
+        """Part of the mesh in the relative force error, estimated from finer elements; None where it is not known."""
+        return None if self.mesh is None else self.mesh.part
+
+    @property
+    def whole_force_error(self) -> float | None:
+        """Relative force error of surrogate and mesh, the sum of the former at the 95th percentile and the latter."""
+        if self.mesh_part is None or self.force is None or self.force.p95 is None:
+            return None
+        return float(self.force.p95 + self.mesh_part)
+
+    @property
     def caution(self) -> str:
         """A sentence where the unseen solves are too few to judge by; "" where they suffice, or histories judge."""
         if self.samples >= ENOUGH or self.force is None:
@@ -136,6 +148,9 @@ class Validation:
             found["unseen histories"] = self.histories.count
         found["force error, median"] = force.median
         found["force error, 95th percentile"] = force.p95
+        if self.whole_force_error is not None:
+            found["force error with the mesh's"] = self.whole_force_error
+            found["force error, the mesh's part"] = self.mesh_part
         found["limits kept"] = self.passed
         return {**found, "caution": self.caution} if self.caution else found
 
@@ -191,7 +206,8 @@ def validate(
         What `palpate.learn` returned beside the model, or the record of a sequential filter alone: its held-out
         error tells whether the filter was stable.
     refined : Dataset or TouchSolves, optional
-        Some of the places solved with half the element size, at least 20: they give the mesh's own error.
+        Some of the places solved with half the element size: three give the mesh's part in the force error, 20 the
+        error of surrogate and mesh together.
     strokes : sequence of TouchSolves, optional
         Solves along strokes, beside which smoothness is judged; by default random strokes beside the model itself.
     limits : Limits, optional

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -29,12 +29,16 @@ if TYPE_CHECKING:
     from palpate.physics.interactions.sphere_contact import Contact
     from palpate.physics.shapes.shape import Geometry
 
-__all__ = ["SphereProbe"]
+__all__ = ["RIGID", "SphereProbe"]
 
 ELEMENT = 0.5  # element size under the probe over its radius: the force then ripples by < 0.2 % from 0.1 R of depth on
 ROUND_ELEMENT = 0.4  # the same on curved surfaces, where the elements' shape adds to the error
 # the same in bodies of several regions: on a skin over soft fat 0.5 makes the force 3 to 7 % too large
 LAYERED_ELEMENT = 0.25
+# the same under a rigid sphere: no pad evens its pressure out, and 0.5 makes the force 4 to 5 % too large
+RIGID_ELEMENT = 0.4
+RIGID = "rigid"
+"""The pad of a rigid sphere, for which a stiffness follows from the body."""
 MARGIN = 1.3  # how far beyond its contact points the probe may touch, over its radius
 # share of the radius: a box of contact points that ends so near to the surface's rim ends there
 END = 1e-3
@@ -65,11 +69,12 @@ class SphereProbe(PlainInteraction):
         R in m.
     touches : str
         Name of the surface that it presses.
-    pad : float
-        Stiffness k of the pad in N/m³. A modelling choice: the probe's own skin, in series with the body.
+    pad : float or "rigid"
+        Stiffness k of the pad in N/m³. A modelling choice: the probe's own skin, in series with the body. "rigid" takes
+        one so stiff that it leaves about 1 % of depth and force, by the body's modulus, radius and largest depth.
     stop : float or None
         Penetration p_m in m at which the pad is fully pressed. None for a pad without a stop, which swallows
-        the sphere beyond some depth: such solves fail then.
+        the sphere beyond some depth: such solves fail then. A rigid pad has none.
     depth : tuple of two floats
         Least and largest depth of the sphere's tip below the surface at rest, in m.
     over : tuple of two corners, optional
@@ -88,7 +93,7 @@ class SphereProbe(PlainInteraction):
 
     radius: float
     touches: str = "top"
-    pad: float = 2e6
+    pad: float | Literal["rigid"] = 2e6
     stop: float | None = 0.004
     depth: tuple[float, float] = (0.0, 0.015)
     over: tuple[Corner, Corner] | None = None
@@ -96,7 +101,8 @@ class SphereProbe(PlainInteraction):
 
     def __post_init__(self) -> None:
         checks.positive("The probe's radius", self.radius, "m")
-        checks.positive("The probe's pad stiffness", self.pad, "N/m³")
+        if self.pad != RIGID:
+            _require_pad(self.pad)
         if self.stop is not None:
             checks.positive("The probe's stop", self.stop, "m")
         object.__setattr__(self, "depth", range_of("The depth of a probe", self.depth, "m"))
@@ -105,8 +111,10 @@ class SphereProbe(PlainInteraction):
 
     def __str__(self) -> str:
         around = "" if self.rim is None else f" and its rim {self.rim!r}"
-        stop = f" with a stop at {millimetres(self.stop)}" if self.stop is not None else " without a stop"
         place = f"on {self.touches!r}{around}"
+        if isinstance(self.pad, str):
+            return f"rigid sphere of radius {millimetres(self.radius)} {place}"
+        stop = f" with a stop at {millimetres(self.stop)}" if self.stop is not None else " without a stop"
         return f"sphere of radius {millimetres(self.radius)} {place}, pad {number(self.pad)} N/m³{stop}"
 
     def describe(self) -> dict[str, Any]:
@@ -139,7 +147,7 @@ class SphereProbe(PlainInteraction):
         patch = Patch.from_mesh(geometry.rest(), self._surface(geometry))
         low, high = self._box(patch)
         low, high = low - MARGIN * self.radius, high + MARGIN * self.radius
-        element = _element(geometry, patch) * self.radius
+        element = _element(geometry, patch, self.pad == RIGID) * self.radius
         return (FineMesh(self.meets, element, tuple(low.tolist()), tuple(high.tolist())),)
 
     def design(self, geometry: Geometry, samples: int, seed: int, depths: int | None = None) -> np.ndarray:
@@ -206,7 +214,23 @@ class SphereProbe(PlainInteraction):
         return np.asarray(centres + (radius - self.radius) * normals)
 
     def attach(self, field: Field) -> Attached:
-        """Return its contact energy on an opened body."""
+        """Return its contact energy on an opened body.
+
+        Raises
+        ------
+        UsageError
+            For a rigid sphere that no problem has given a pad.
+        """
+        if isinstance(self.pad, str):
+            raise UsageError(
+                "A rigid sphere can't be attached by itself.",
+                why="The stiffness of its pad follows from the body.",
+                fix="Put a body under it: body.problem(probe).",
+            )
+        return self.attach_pad(field, self.pad)
+
+    def attach_pad(self, field: Field, pad: Any) -> Attached:
+        """Return its contact energy on an opened body with a stiffness, a number in N/m³ or a parameter of NGSolve."""
         import ngsolve
 
         from palpate.physics.interactions.sphere_contact import Contact, pad_energy
@@ -214,7 +238,7 @@ class SphereProbe(PlainInteraction):
         contact = Contact(field, field.rest, self.meets, self.radius, self.stop)
         centre = tuple(ngsolve.Parameter(0.0) for _ in range(3))
         penetration = contact.penetration(field.trial, ngsolve.CF(centre))
-        energy = Energy(pad_energy(penetration, self.pad, self.stop), contact.measure())
+        energy = Energy(pad_energy(penetration, pad, self.stop), contact.measure())
         approach = _Approach(self, field, contact)
         return Attached(
             centre,
@@ -330,10 +354,22 @@ class _Approach:
 _GRID = np.stack(np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9)), axis=-1).reshape(-1, 2)
 
 
-def _element(geometry: Geometry, patch: Patch) -> float:
+def _require_pad(pad: Any) -> None:
+    if isinstance(pad, str):
+        raise UsageError(
+            f"The pad of a probe is {pad!r}.",
+            why="It is a stiffness in N/m³, or the word that asks for none that is felt.",
+            fix='Give a number such as 2e6, or "rigid".',
+        )
+    checks.positive("The probe's pad stiffness", pad, "N/m³")
+
+
+def _element(geometry: Geometry, patch: Patch, is_rigid: bool) -> float:
     """Return the element size under the probe over its radius."""
     if len(geometry.regions) > 1:
         return LAYERED_ELEMENT
+    if is_rigid:
+        return RIGID_ELEMENT
     return ELEMENT if patch.is_plane else ROUND_ELEMENT
 
 

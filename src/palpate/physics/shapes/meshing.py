@@ -301,7 +301,9 @@ def _patch(face: Any, lower: np.ndarray, upper: np.ndarray) -> list[Any]:
         corner[axis], corner[across[0]], corner[across[1]] = level, first[across[0]], second[across[1]]
         corners.append(Pnt(*corner.tolist()))
     rectangle = Face(Wire([Segment(p, q) for p, q in pairwise([*corners, corners[0]])]))
-    return [rectangle * face]
+    patch = rectangle * face
+    # a face that was cut before need not reach the rectangle, though its box does
+    return [patch] if list(patch.faces) else []
 
 
 def _restricted_faces(solid: Any, refinements: list[FineMesh]) -> list[tuple[float, float]]:

@@ -44,7 +44,8 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         ranges = [asdict(r) for r in inputs]
         content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(contents)}
         warning = _warning(contents)
-        noun = _NOUNS.get(what, what)
+        felt = getattr(contents, "can_be_touched", True)
+        noun = _NOUNS.get(what, what) if felt else "A surrogate of numbers and fields"
         names = ",".join(r.name for r in inputs)
         ways = [
             f"ask it   palpate ask {model} --at {names}",

@@ -56,10 +56,7 @@ class DatasetAnswers:
     def of(cls, data: Dataset, *, to_learn: bool = True) -> DatasetAnswers:
         """Return the answers of a dataset; those to judge by need not vary.
 
-        Raises
-        ------
-        UsageError
-            If an input never varies, two inputs always vary together, or there is nothing to learn.
+        An input that never varies, two inputs that always vary together, and a dataset without answers are refused.
         """
         good = data.ok
         names = [str(n) for n in good.data.data_vars if str(n) not in _NO_ANSWERS]

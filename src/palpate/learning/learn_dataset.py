@@ -1,40 +1,36 @@
 """`palpate.learn`: a dataset of solves made into a surrogate: what a hand feels where there is one, fields, numbers.
 
-What a dataset is of is asked once, here: of the recognisers of palpate, and of all registered baselines. Where nothing
-that a hand feels is recognised, its numbers, fields and curves are learnt as they are.
+What a dataset is of is asked once, of the registry in `recognised`. Where nothing that a hand feels is recognised, its
+numbers, fields and curves are learnt as they are.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
 from palpate.format import count, share
+from palpate.learning import bent_body, pad_solves, pressed_solves  # noqa: F401  # which enter the kinds that they recognise
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
-from palpate.learning.bent_body import BentSolves
 from palpate.learning.dataset_answers import DatasetAnswers
 from palpate.learning.energy import EnergyHistory, learn_energy
-from palpate.learning.fields import LearntField, LearntModes, learn_modes, learn_snapshots, lumped_mass
+from palpate.learning.fields import LearntField, LearntModes, learn_modes
 from palpate.learning.learning_history import History
-from palpate.learning.pad_fit import fit_pad
-from palpate.learning.pad_solves import is_padded, pad_solves
-from palpate.learning.pressed_solves import PressedSolves, is_pressed
+from palpate.learning.recognised import Request, recognise
 from palpate.learning.search import Budget
 from palpate.options import FieldOptions, FitOptions, SearchOptions, takes
-from palpate.surrogates import Baseline, ContactLaw, Solves, Surrogate
-from palpate.surrogates.baselines import registered_baselines
+from palpate.surrogates import Surrogate
 
 __all__ = ["LearningHistory", "filter_record", "learn"]
 
 # fields that are learnt where a dataset has them, with what they are called and their units
 _SHOWN = {"displacement": ("displacement", "m"), "von_mises": ("von Mises stress", "Pa")}
 _FIELD_SHARE = 0.25  # of the energy's limit on time, for each field: most of a shape is found at once
-_PAD_UNITS, _PAD_NETWORKS = 192, 4  # of one network and of a mean, for a pad in five dimensions
 
 Log = Callable[[str], None]
 
@@ -105,19 +101,6 @@ def filter_record(history: Any) -> History | None:
     return own if isinstance(own, History) else None
 
 
-@dataclass(frozen=True, eq=False)
-class _Recognised:
-    """A dataset's baseline and solves, and what else is known of the body."""
-
-    baseline: Baseline
-    solves: Solves
-    options: Mapping[str, Any]  # of learning its energy
-    learn_field: Callable[[FieldOptions], LearntField] | None = None
-    fields: Mapping[str, Any] = field(default_factory=dict)  # that are learnt already
-    meta: Mapping[str, Any] = field(default_factory=dict)
-    filter: History | None = None
-
-
 @takes(SearchOptions)
 def learn(
     train: Dataset,
@@ -177,8 +160,9 @@ def learn(
         )
     budget, began = Budget.of(options.effort, options.seconds), time.monotonic()
     solves = len(train.ok)
-    known = _recognise(train, layout, options, further)
+    known = recognise(train, Request(options, layout, further))
     if known is None:
+        _refuse_options(further)
         return _learn_answers(train, name, options, log)
     log(f"energy of {count(solves, 'solve')}")
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
@@ -203,21 +187,13 @@ def learn(
     return surrogate, LearningHistory(found, solves, spent, learnt, known.filter)
 
 
-def _recognise(
-    train: Dataset, layout: Layout | None, search: SearchOptions, options: Mapping[str, Any]
-) -> _Recognised | None:
-    """Return the first kind of body that a dataset is of, registered baselines last; None where no hand feels it."""
-    for kind in (_recognise_bent, _recognise_pressed, _recognise_held, _recognise_registered):
-        known = kind(train, layout, search, dict(options))
-        if known is not None:
-            return known
+def _refuse_options(options: Mapping[str, Any]) -> None:
     if options:
         raise UsageError(
             f"The option {next(iter(options))!r} is of bodies that a hand feels.",
             why="No baseline recognises this dataset, so its numbers and fields are learnt.",
             fix="Leave it out, or register a baseline with `recognise`.",
         )
-    return None
 
 
 def _learn_answers(
@@ -275,74 +251,3 @@ def _fit_options(options: SearchOptions, budget: Budget, left: int) -> FitOption
     workers = 1 if options.workers is None else options.workers
     effort = FitOptions().effort * options.effort
     return FitOptions(effort=effort, seconds=seconds, workers=workers, seed=options.seed)
-
-
-def _take(options: dict[str, Any], *names: str) -> dict[str, Any]:
-    """Return options of these names, and take them out of all."""
-    return {name: options.pop(name) for name in names if name in options}
-
-
-def _recognise_bent(
-    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
-) -> _Recognised | None:
-    del layout
-    if "input_node" not in train:
-        return None
-    own = _take(options, "heldout", "settings", "refinement", "passes", "coupling", "progress", "watch")
-    bent = BentSolves.of(train, search, **own)
-    context: dict[str, Any] = {"fields": bent.fields, "meta": bent.meta, "filter": bent.filter.history}
-    return _Recognised(bent.baseline, bent.solves, bent.options | options, **context)
-
-
-def _recognise_registered(
-    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
-) -> _Recognised | None:
-    del layout, search
-    pairs = (cls.recognise(train) for cls in registered_baselines())
-    baseline, solves = next((pair for pair in pairs if pair is not None), (None, None))
-    if baseline is None or solves is None:
-        return None
-    return _Recognised(baseline, solves, {**solves.options, **options})
-
-
-def _recognise_pressed(
-    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
-) -> _Recognised | None:
-    if not is_pressed(train):
-        return None
-    pressed = PressedSolves.of(train, layout)
-
-    def learn_field(field: FieldOptions) -> LearntField:
-        return learn_snapshots(
-            pressed.snapshots(field.name, seed=search.seed),
-            inputs=pressed.inputs,
-            points=pressed.points,
-            triangles=pressed.triangles,
-            mass=lumped_mass(pressed.points, pressed.triangles),
-            surface=pressed.surface,
-            radius=pressed.radius,
-            radius_input=pressed.radius_input,
-            options=field,
-            drawn=pressed.drawn,
-        )
-
-    baseline = pressed.baseline
-    law, length = options.pop("law", "auto"), options.pop("length", None)
-    if isinstance(law, ContactLaw):
-        baseline, options["choose"] = replace(baseline, law=law), False
-    elif length is not None:
-        baseline = replace(baseline, law=ContactLaw("series", length))
-    known = {"deepest": pressed.deepest or None}
-    return _Recognised(baseline, pressed.solves, known | options, learn_field)
-
-
-def _recognise_held(
-    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
-) -> _Recognised | None:
-    del layout, search
-    if not is_padded(train):
-        return None
-    solves = pad_solves(train)
-    baseline = fit_pad(solves, **_take(options, "degree", "stiffening"))[0]
-    known = {"units_max": _PAD_UNITS, "networks": _PAD_NETWORKS}
-    return _Recognised(baseline, solves, known | options)

@@ -338,7 +338,7 @@ class _Record:
         return value
 
     def _optional(self, name: str) -> bool:
-        """Whether a file may lack a field: what may be nothing, or a mapping that is empty by default."""
+        """Return whether a file may lack a field: one that may be nothing, or a mapping that is empty by default."""
         if isinstance(self.forms[name], _ByName):
             return self.cls.__dataclass_fields__[name].default_factory is dict  # type: ignore[attr-defined]
         return isinstance(self.forms[name], _Maybe) and getattr(self.cls, name, 0) is None

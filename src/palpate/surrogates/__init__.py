@@ -1,4 +1,4 @@
-"""What was learnt of a model: what a hand, an eye or a program can ask of it.
+"""Surrogates, learnt of models: energy, fields and numbers that a hand, an eye or a program asks for.
 
 ::
 

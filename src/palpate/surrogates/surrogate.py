@@ -1,4 +1,4 @@
-"""What was learnt of a model, in one value: energy that a hand feels, fields, numbers, and the record of its making.
+"""A surrogate of a model in one value: energy that a hand feels, fields, numbers, and the record of its making.
 
 This is what `palpate.learn` makes, what a file holds, and what everything downstream takes. At least one of energy,
 fields and quantities is there, and what a surrogate can do is asked of them: `can_be_touched` tells whether a hand
@@ -42,7 +42,7 @@ _FORMER = ("touch", "held-body", "touched-body", "touch-surrogate", "grasp-surro
 
 @dataclass(frozen=True, eq=False)
 class Surrogate:
-    """What was learnt of a model, as a value: `save` and `load` give it back bit for bit.
+    """A surrogate of a model as a value: `save` and `load` give it back bit for bit.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class Surrogate:
 
     @property
     def can_be_touched(self) -> bool:
-        """Whether a hand feels it: it has an energy."""
+        """True where a hand feels it: it has an energy."""
         return self.energy is not None
 
     @property
@@ -253,7 +253,9 @@ class Surrogate:
         return page_of(self)
 
     def _repr_html_(self) -> str | None:
-        """Show the body in a notebook, in a frame of its own; None where it can't be a page."""
+        """Show the body in a notebook, in a frame of its own, or its card; None where it can't be a page."""
+        if not self.can_be_touched:
+            return self.card()._repr_html_()
         try:
             page = self.to_html()
         except UsageError:

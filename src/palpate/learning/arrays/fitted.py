@@ -126,9 +126,13 @@ class Fitted:
             Its name, for record and page; by default those of its outputs.
         """
         outputs = [q.name for q in self.network.outputs]
-        meta = {**self._with_record().meta, "samples": self.network.meta.get("training", {}).get("samples")}
+        network = self._with_record()
+        learnt = replace(
+            self._learnt, network=network, uncertainty=replace(self.uncertainty, network=network)
+        )
+        meta = {**network.meta, "samples": self.network.meta.get("training", {}).get("samples")}
         meta = {k: v for k, v in meta.items() if v is not None} | {"name": name or ", ".join(outputs[:3])}
-        return Surrogate(meta=meta, quantities={outputs[0] if len(outputs) == 1 else "outputs": self._learnt})
+        return Surrogate(meta=meta, quantities={outputs[0] if len(outputs) == 1 else "outputs": learnt})
 
     def interval(self, X: Any, level: float | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return lower and upper bounds (N, m) for what would be measured at X (N, n), output by output.

@@ -24,7 +24,7 @@ from palpate.learning.fields.decompose_field import SurfaceModes
 from palpate.learning.folds import fold_masks
 from palpate.options import FitOptions
 from palpate.surrogates import AxisPlaces, MeshPlaces, ModalField
-from palpate.units import Quantity, Range
+from palpate.units import Quantity, Range, bounds
 
 __all__ = ["LearntModes", "learn_modes"]
 
@@ -33,6 +33,10 @@ _TOLERANCE = (
 )
 _MODES = 40  # at most: a picture of 20,000 nodes then takes 100 µs
 _FOLDS = 10  # parts of the solves, of each of which modes of the others miss something
+_ASKED = 1000  # inputs between the ends, of whose deviations the widths are made
+# share of the weights by deviation in the mean with equal ones. Of six studies of 30 to 60 solves, 250 unseen cases
+# each, nine tenths became 91 % in all (78 to 97); with 0 they became 93 % (83 to 98), with 1 87 % (73 to 97)
+_SHIFTED = 0.5
 _PLACES = 400  # places that set the widths and measure the error, spread evenly over all of them
 
 
@@ -138,7 +142,8 @@ def learn_modes(
         fitted = fit(X, along, list(inputs), quantities, options=options or FitOptions())
     scatter = np.sqrt((left**2).mean(axis=0))
     errors, spread = _errors(fitted, along, modes, left)
-    widening = _widening(errors, np.sqrt(spread + _some(scatter[None]) ** 2), fitted.level)
+    weights = _weights(fitted, inputs)
+    widening = _widening(errors, np.sqrt(spread + _some(scatter[None]) ** 2), weights, fitted.level)
     sizes = np.sqrt((errors**2).sum(axis=2))
     meta = {
         "solves": len(X),
@@ -202,12 +207,40 @@ def _errors(
     return np.asarray(errors), np.asarray(np.tensordot(rows.deviation[judged] ** 2, some**2, 1))
 
 
-def _widening(errors: np.ndarray, deviation: np.ndarray, level: float) -> float:
+def _weights(fitted: Fitted, inputs: Sequence[Range]) -> np.ndarray:
+    """Return what each solve left out (J,) counts when widths are set; they add up to one.
+
+    Solves at the border of what was solved are many, and left out they are extrapolated. As intervals are asked for
+    inputs everywhere between the ends, each counts as often as such inputs have its stated deviation (the weights of a
+    covariate shift, Tibshirani, Barber, Candès & Ramdas 2019). Of few solves these weights rest on a handful of them,
+    so they are averaged with equal ones.
+    """
+    rows = fitted.comparison
+    assert rows is not None
+    assert rows.deviation is not None
+    low, high = bounds(inputs)
+    asked = np.random.default_rng(0).uniform(low, high, (_ASKED, len(low)))
+    inside = fitted.trusted(asked)
+    asked = asked[inside] if inside.any() else asked
+    there = np.log((fitted.deviation(asked).reshape(len(asked), -1) ** 2).sum(axis=1))
+    here = np.log((rows.deviation**2).sum(axis=1))
+    nearest = np.abs(there[:, None] - here[None]).argmin(axis=1)
+    # equal deviations share what falls to them
+    _, own, number = np.unique(here, return_inverse=True, return_counts=True)
+    each = np.bincount(own[nearest], minlength=len(number)) / number / len(asked)
+    return np.asarray(_SHIFTED * each[own] + (1.0 - _SHIFTED) / len(here))
+
+
+def _widening(errors: np.ndarray, deviation: np.ndarray, weights: np.ndarray, level: float) -> float:
     """Return what deviations are to be multiplied by, so that the intervals hold the share `level` of the errors.
 
     Not-a-number where so few solves were left out that no share of them would say it.
     """
-    if len(errors) < 2:
+    if len(errors) < 2 or len(weights) != len(errors):
         return math.nan
-    scores = np.abs(errors) / np.maximum(deviation, 1e-300)
-    return float(np.quantile(scores, level) / NormalDist().inv_cdf((1.0 + level) / 2.0))
+    scores = (np.abs(errors) / np.maximum(deviation, 1e-300)).reshape(len(errors), -1)
+    each = np.repeat(weights / scores.shape[1], scores.shape[1])
+    order = np.argsort(scores, axis=None)
+    reached = np.cumsum(each[order])
+    middle = scores.ravel()[order][np.searchsorted(reached, level * reached[-1])]
+    return float(middle / NormalDist().inv_cdf((1.0 + level) / 2.0))

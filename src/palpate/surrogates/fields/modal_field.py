@@ -105,7 +105,7 @@ class ModalField:
 
     @property
     def is_curve(self) -> bool:
-        """Whether its places are points of an axis."""
+        """True where its places are points of an axis."""
         return isinstance(self.places, AxisPlaces)
 
     def fault_beside(self, energy: LearntEnergy) -> str:

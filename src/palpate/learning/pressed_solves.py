@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,16 @@ from palpate.dataset.carried_surface import (
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
-from palpate.learning.fields import Snapshots, lumped_mass
+from palpate.learning.fields import LearntField, Snapshots, learn_snapshots, lumped_mass
 from palpate.learning.kept_surface import touched_surface
 from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_region
+from palpate.learning.recognised import Recognised, Request, recogniser
+from palpate.options import FieldOptions
 from palpate.surrogates import ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
 from palpate.surrogates.baselines import depth_series
 from palpate.units import Range
 
-__all__ = ["FEWEST", "PressedSolves", "is_pressed"]
+__all__ = ["FEWEST", "PressedSolves", "is_pressed", "recognise_pressed"]
 
 FEWEST = 6  # solves in contact: what the law and an affine network have to be found from, and judged by
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # what "side" of a box means
@@ -49,6 +52,38 @@ def _probe(data: Dataset) -> Mapping[str, Any] | None:
     acting = data.provenance.get("problem", {}).get("interactions", [])
     probes = [a for a in acting if isinstance(a, Mapping) and a.get("type") in PROBES]
     return probes[0] if len(probes) == len(acting) == 1 else None
+
+
+@recogniser
+def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
+    """Return the body of solves under one probe; None of any other dataset."""
+    if not is_pressed(data):
+        return None
+    pressed = PressedSolves.of(data, request.layout)
+
+    def learn_field(field: FieldOptions) -> LearntField:
+        return learn_snapshots(
+            pressed.snapshots(field.name, seed=request.search.seed),
+            inputs=pressed.inputs,
+            points=pressed.points,
+            triangles=pressed.triangles,
+            mass=lumped_mass(pressed.points, pressed.triangles),
+            surface=pressed.surface,
+            radius=pressed.radius,
+            radius_input=pressed.radius_input,
+            options=field,
+            drawn=pressed.drawn,
+        )
+
+    own, options = request.split("law", "length", "deviation")
+    baseline, law, length = pressed.baseline, own.get("law", "auto"), own.get("length")
+    if isinstance(law, ContactLaw):
+        baseline, options["choose"] = replace(baseline, law=law), False
+    elif length is not None:
+        baseline = replace(baseline, law=ContactLaw("series", length))
+    region = partial(pressed.painted_region, deviation=own.get("deviation"))
+    deepest = {"deepest": pressed.deepest or None}
+    return Recognised(baseline, pressed.solves, deepest | options, learn_field, region=region)
 
 
 @dataclass(frozen=True, eq=False)

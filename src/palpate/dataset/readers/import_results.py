@@ -16,9 +16,9 @@ from palpate.dataset.assemble import assemble
 from palpate.dataset.dataset import Dataset
 from palpate.dataset.readers.column_choice import chosen_columns
 from palpate.dataset.readers.formats import read_results
-from palpate.dataset.readers.imported_layout import along_axes, body_layout
+from palpate.dataset.readers.imported_layout import along_axes, body_layout, further_places
 from palpate.dataset.readers.load_energies import with_energies
-from palpate.dataset.readers.long_tables import by_case_and_place
+from palpate.dataset.readers.long_tables import by_case_and_axis, by_case_and_place
 from palpate.dataset.readers.mapping import ImportMapping, read_mapping
 from palpate.dataset.readers.results import Column, Results, join_cases, join_columns
 from palpate.dataset.readers.slope_of_energy import contradiction
@@ -90,7 +90,7 @@ def import_results(
             why=f"Columns of {results.source} are {', '.join(results.columns)}.",
             fix="Add [[inputs]] and [[outputs]] with a name and the column that each comes from.",
         )
-    results = by_case_and_place(results, wishes)
+    results = by_case_and_axis(by_case_and_place(results, wishes), wishes)
     return _dataset(results, wishes, paths)
 
 
@@ -143,7 +143,10 @@ def _dataset(results: Results, mapping: ImportMapping, paths: Sequence[Path]) ->
         notes.append(f"Skipped {lost} whose inputs are not all numbers.")
     inputs, answers = inputs[rows], {name: values[rows] for name, values in answers.items()}
     nodal = [field.name for field in fields if "node" in field.dims]
-    layout, kept, about_nodes = body_layout(results, mapping, nodes, {name: answers[name] for name in nodal})
+    further = further_places(results, mapping, {dim for field in fields for dim in field.dims})
+    at_nodes = {name: answers[name] for name in nodal}
+    layout, kept, about_nodes = body_layout(results, mapping, nodes, at_nodes, cells="cells" in further)
+    layout = replace(layout, **further)
     answers |= {name: answers[name][:, kept] for name in nodal}
     fields = [replace(field, shape=tuple(answers[field.name].shape[1:])) for field in fields]
     ranges = _ranges(mapping, inputs, units)
@@ -208,34 +211,45 @@ def _outputs(
                 f"The components of {entry.name!r} belong to different places.",
                 fix="Choose components of one kind of places.",
             )
-        if where and not results.places[where].nodal:
-            raise UsageError(
-                f"The output {entry.name!r} has a value for each of the {where}, which are no nodes.",
-                fix='Take a quantity at nodes, or one number: reduce = "max".',
-            )
-        if where and nodes and where != nodes:
+        dim = _dimension(results, where, entry.name, mapping)
+        if dim == "node" and nodes and where != nodes:
             raise UsageError(
                 f"The output {entry.name!r} belongs to {where!r}, others to {nodes!r}.",
                 why="A dataset has one set of nodes.",
                 fix="Choose columns of one set, or single places by `at`.",
             )
-        nodes = nodes or where
+        nodes = nodes or (where if dim == "node" else "")
         values = np.stack([column.values for column in found], axis=-1)
-        if entry.name == "displacement" and where:
+        if entry.name == "displacement" and dim == "node":
             values = along_axes(results, mapping, values)
         meaning = entry.meaning or f"from {', '.join(column.name for column in found)}"
-        field, answers[entry.name] = _field(
-            Field(entry.name, unit=unit, meaning=meaning), values, units, bool(where)
-        )
+        field, answers[entry.name] = _field(Field(entry.name, unit=unit, meaning=meaning), values, units, dim)
         fields.append(field)
     return fields, answers, nodes
 
 
-def _field(field: Field, values: np.ndarray, units: Sequence[str], nodal: bool) -> tuple[Field, np.ndarray]:
-    """Return a field with its dimensions, and its values (case, node, k) or (case, k), without k where it is 1."""
-    if field.name == "displacement" and nodal:
+def _dimension(results: Results, where: str, name: str, mapping: ImportMapping) -> str:
+    """Return the dataset's dimension of the places that an output has values at; "" of one number a case."""
+    if not where:
+        return ""
+    places = results.places[where]
+    if places.axis:
+        return mapping.axis
+    if places.nodal:
+        return "node"
+    if where == "cells" and places.coordinates:
+        return "cell"
+    raise UsageError(
+        f"The output {name!r} has a value for each of the {where}, whose places the files do not tell.",
+        fix='Take a quantity at nodes or cells, or one number: reduce = "max".',
+    )
+
+
+def _field(field: Field, values: np.ndarray, units: Sequence[str], dim: str) -> tuple[Field, np.ndarray]:
+    """Return a field with its dimensions, and its values (case, place, k) or (case, k), without k where it is 1."""
+    if field.name == "displacement" and dim == "node":
         return replace(field, dims=("node", "component"), shape=values.shape[1:]), values
-    if field.name == "response" and not nodal:
+    if field.name == "response" and not dim:
         if values.shape[1] != len(units):
             raise UsageError(
                 f"The response has {values.shape[1]} components for {count(len(units), 'input')}.",
@@ -243,7 +257,7 @@ def _field(field: Field, values: np.ndarray, units: Sequence[str], nodal: bool) 
             )
         unit = ", ".join(map(conjugate_unit, units))
         return replace(field, dims=("input",), shape=values.shape[1:], unit=unit), values
-    dims: tuple[str, ...] = ("node",) if nodal else ()
+    dims: tuple[str, ...] = (dim,) if dim else ()
     if values.shape[-1] == 1:
         values = values[..., 0]
     else:

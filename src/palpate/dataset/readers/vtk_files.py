@@ -8,6 +8,7 @@ crash it, and packed numbers may take any memory.
 from __future__ import annotations
 
 import importlib.util
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from palpate.dataset.readers.results import TIME, Column, Places, Results, refuse
-from palpate.dataset.readers.surface import outer_surface
+from palpate.dataset.readers.surface import CORNERS, cells_of_triangles, outer_surface
 from palpate.errors import FileFormatError, UsageError
 from palpate.input_files import DAMAGE, plain_text, read_input
 from palpate.supervised import read_in_child
@@ -55,6 +56,7 @@ class Grid:
 
     points: np.ndarray
     cells: Sequence[tuple[str, np.ndarray]]
+    numbers: Sequence[np.ndarray]  # of the cells of each kind, among all cells
     count: int
     point_data: Mapping[str, np.ndarray]
     cell_data: Mapping[str, np.ndarray]
@@ -150,6 +152,7 @@ def _read_with_pyvista(path: Path) -> Grid:
         grid: Any = reader.read()
         whole = grid.cast_to_unstructured_grid()
         cells = [(_KINDS[kind], nodes) for kind, nodes in whole.cells_dict.items() if kind in _KINDS]
+        numbers = [np.flatnonzero(whole.celltypes == kind) for kind in whole.cells_dict if kind in _KINDS]
     except DAMAGE as error:
         raise _damage_error(path, str(error)) from error
     if faults or not whole.n_points:
@@ -158,6 +161,7 @@ def _read_with_pyvista(path: Path) -> Grid:
         path,
         np.asarray(whole.points, dtype=float),
         cells,
+        numbers,
         int(whole.n_cells),
         dict(whole.point_data.items()),
         dict(whole.cell_data.items()),
@@ -177,15 +181,17 @@ def _read_with_meshio(path: Path) -> Grid:
         ) from error
     kinds = [(block.type.rstrip("0123456789"), block.data) for block in mesh.cells]
     cell_data = {name: np.concatenate(values) for name, values in mesh.cell_data.items()}
-    count = sum(len(block.data) for block in mesh.cells)
+    ends = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+    count, numbers = int(ends[-1]), [np.arange(a, b) for a, b in itertools.pairwise(ends)]
     points = np.asarray(mesh.points, dtype=float)
-    return _sound(path, points, kinds, count, mesh.point_data, cell_data, mesh.field_data)
+    return _sound(path, points, kinds, numbers, count, mesh.point_data, cell_data, mesh.field_data)
 
 
 def _sound(
     path: Path,
     points: np.ndarray,
     cells: Sequence[tuple[str, np.ndarray]],
+    numbers: Sequence[np.ndarray],
     count: int,
     *data: Mapping[str, Any],
 ) -> Grid:
@@ -196,7 +202,9 @@ def _sound(
     if points.ndim != 2 or not np.isfinite(points).all():
         raise _damage_error(path, "coordinates of nodes are no finite numbers")
     plain = [{plain_text(str(name)): np.array(values) for name, values in arrays.items()} for arrays in data]
-    return Grid(np.array(points), [(kind, np.array(nodes)) for kind, nodes in cells], count, *plain)
+    return Grid(
+        np.array(points), [(kind, np.array(nodes)) for kind, nodes in cells], list(numbers), count, *plain
+    )
 
 
 def _damage_error(path: Path, why: str, fix: str = "") -> FileFormatError:
@@ -229,14 +237,28 @@ def _collect(path: Path, grids: Sequence[Grid], times: np.ndarray | None) -> Res
         axis: Column(axis, first.points[:, i], None, "{length}")
         for i, axis in enumerate("xy" if plane and len(first.points) > 1 else "xyz")
     }
+    triangles = outer_surface(first.cells, first.points)
     places = {
-        "nodes": Places(np.arange(len(first.points)), coordinates, outer_surface(first.cells, first.points)),
-        "cells": Places(np.arange(first.count), nodal=False),
+        "nodes": Places(np.arange(len(first.points)), coordinates, triangles),
+        "cells": _cells(first, triangles, tuple(coordinates)),
     }
     used = {column.places for column in columns} | {"nodes"}
     places = {name: value for name, value in places.items() if name in used}
     form = f"{FORMAT} {path.suffix}"
     return Results.of(path, form, len(grids), columns, places, notes)
+
+
+def _cells(grid: Grid, triangles: np.ndarray | None, axes: Sequence[str]) -> Places:
+    """Return the cells of a file with their middles, and the cell of each triangle of the surface."""
+    blocks = [
+        (*block, own) for block, own in zip(grid.cells, grid.numbers, strict=True) if block[0] in CORNERS
+    ]
+    middles = np.full((grid.count, grid.points.shape[1]), np.nan)
+    for kind, nodes, own in blocks:
+        middles[own] = grid.points[nodes[:, : CORNERS[kind]]].mean(axis=1)
+    columns = {axis: Column(axis, middles[:, i], None, "{length}") for i, axis in enumerate(axes)}
+    owners = None if triangles is None else cells_of_triangles(blocks, triangles)
+    return Places(np.arange(grid.count), columns, nodal=False, cell_of=owners)
 
 
 def _reason_to_skip(name: str, sample: Any, arrays: Sequence[Mapping[str, Any]]) -> str:

@@ -23,6 +23,7 @@ from palpate.records import Count, Record, in_si
 from palpate.study.study_paths import Paths
 from palpate.sweeps.command_problem import CommandProblem
 from palpate.sweeps.template_files import DIGITS, TemplateFiles
+from palpate.sweeps.umbridge_problem import UMBridgeProblem
 from palpate.tables.unit_names import plain_unit
 from palpate.unit_text import si_conversion
 from palpate.units import Range
@@ -33,6 +34,7 @@ __all__ = [
     "SolverStudy",
     "SolverSweepRecord",
     "SolverTestRecord",
+    "UMBridgeRecord",
     "read_solver_study",
     "says_solver",
 ]
@@ -80,12 +82,56 @@ class SolverRecord(Record):
             raise ValueError(f"{value!r} is no time that a program could take")
         return seconds
 
+    def problem(self, study: SolverStudy, folder: Path, limit: float) -> CommandProblem:
+        """Return the problem of a study whose files stand in `folder`; a program takes at most `limit` s."""
+        base, command = folder.resolve(), self.command
+        if os.sep in command[0] and "{" not in command[0]:  # a program beside the study
+            command = (os.path.normpath(base / command[0]), *command[1:])
+        return CommandProblem(
+            ranges=study.ranges,
+            command=command,
+            templates=TemplateFiles(base / self.templates, self.raw, self.digits),
+            results=self.results,
+            mapping=study.results_mapping(folder),
+            cases=base / f"{study.name}.cases",
+            constants={name: _si(value) for name, value in study.values.items()},
+            solution=self.solution,
+            failure=self.failure,
+            limit=limit if self.limit is None else min(limit, float(self.limit)),
+            environment=self.environment,
+        )
+
+
+class UMBridgeRecord(Record):
+    """Model of a UM-Bridge server in place of a command."""
+
+    url: str = Field(
+        pattern=r"^https?://[^/\s]+", description="address of the server", examples=["http://127.0.0.1:4242"]
+    )
+    model: str = Field("forward", description="name of its model")
+    config: dict[str, Any] = Field(default_factory=dict, description="settings that the model takes")
+
+    def problem(self, study: SolverStudy, folder: Path, limit: float) -> UMBridgeProblem:
+        """Return the problem of a study whose files stand in `folder`; a solve takes at most `limit` s."""
+        return UMBridgeProblem(
+            ranges=study.ranges,
+            units=tuple(entry.conversion() for entry in study.inputs),
+            url=self.url,
+            model=self.model,
+            mapping=study.results_mapping(folder),
+            config=self.config,
+            limit=limit,
+        )
+
 
 class SolverInputRecord(Record):
     """One input."""
 
     name: str = Field(min_length=1, pattern=r"^[^|{}\n]+$", description="name, also in the templates")
     range: tuple[Quantity, Quantity] = Field(description="ends with their unit", examples=[["10 W", "50 W"]])
+    unit: str | None = Field(
+        None, description="with `url`: unit that the model takes; templates name their units themselves"
+    )
     load: Load | None = Field(None, description="node and direction, where the input is a force on a node")
 
     @field_validator("range")
@@ -104,6 +150,23 @@ class SolverInputRecord(Record):
         """Return the range in SI units."""
         low, unit = _si(self.range[0])
         return Range(self.name, low, _si(self.range[1])[0], unit)
+
+    def conversion(self) -> tuple[float, float]:
+        """Return factor and offset from the unit that a model takes to SI."""
+        wanted = self.interval().unit
+        if self.unit is None and wanted:
+            raise UsageError(
+                f"The unit of the input {self.name!r} is missing.",
+                why="A model of UM-Bridge takes plain numbers, and states no unit.",
+                fix=f'Add unit = "{wanted}", or the unit that the model takes, to this input.',
+            )
+        factor, offset, unit = si_conversion(plain_unit(self.unit or ""))
+        if unit != wanted:
+            raise UsageError(
+                f"The input {self.name!r} is in {wanted or 'pure numbers'}, and its `unit` is {self.unit}.",
+                fix="Correct one of them.",
+            )
+        return factor, offset
 
 
 def _si(value: Quantity) -> tuple[float, str]:
@@ -140,7 +203,7 @@ class SolverStudy(Record):
     """Study of another program's solver."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", description="files are named after it")
-    solver: SolverRecord
+    solver: SolverRecord | UMBridgeRecord = Field(description="`command`, or `url` of a UM-Bridge server")
     inputs: tuple[SolverInputRecord, ...] = Field(min_length=1)
     values: dict[str, Quantity] = Field(
         default_factory=dict, description="further values for the templates, which do not vary"
@@ -150,6 +213,14 @@ class SolverStudy(Record):
     )
     sweep: SolverSweepRecord = SolverSweepRecord()
     test: SolverTestRecord = SolverTestRecord()
+
+    @field_validator("solver", mode="before")
+    @classmethod
+    def _solver_of_its_kind(cls, value: Any) -> Any:
+        """Return the record that the keys ask for, so that what is wrong with it is said of this one alone."""
+        if not isinstance(value, Mapping):
+            return value
+        return (UMBridgeRecord if "url" in value else SolverRecord).model_validate(dict(value))
 
     @field_validator("values")
     @classmethod
@@ -170,27 +241,16 @@ class SolverStudy(Record):
         content = read_toml(folder / self.mapping) if isinstance(self.mapping, str) else self.mapping
         content = {"name": self.name, **content}
         loads: Mapping[str, Any] = {entry.name: entry.load for entry in self.inputs if entry.load is not None}
-        return mapping_of_outputs(content, [entry.interval() for entry in self.inputs], loads)
+        return mapping_of_outputs(content, self.ranges, loads)
 
-    def problem(self, folder: Path, limit: float) -> CommandProblem:
-        """Return the problem of the study, whose files stand in `folder`; a program takes at most `limit` s."""
-        base, solver = folder.resolve(), self.solver
-        command = solver.command
-        if os.sep in command[0] and "{" not in command[0]:  # a program beside the study
-            command = (os.path.normpath(base / command[0]), *command[1:])
-        return CommandProblem(
-            ranges=tuple(entry.interval() for entry in self.inputs),
-            command=command,
-            templates=TemplateFiles(base / solver.templates, solver.raw, solver.digits),
-            results=solver.results,
-            mapping=self.results_mapping(folder),
-            cases=base / f"{self.name}.cases",
-            constants={name: _si(value) for name, value in self.values.items()},
-            solution=solver.solution,
-            failure=solver.failure,
-            limit=limit if solver.limit is None else min(limit, float(solver.limit)),
-            environment=solver.environment,
-        )
+    @property
+    def ranges(self) -> tuple[Range, ...]:
+        """The inputs in SI units."""
+        return tuple(entry.interval() for entry in self.inputs)
+
+    def problem(self, folder: Path, limit: float) -> CommandProblem | UMBridgeProblem:
+        """Return the problem of the study, whose files stand in `folder`; a solve takes at most `limit` s."""
+        return self.solver.problem(self, folder, limit)
 
     def paths(self, folder: Path) -> Paths:
         """Return the files of the study."""

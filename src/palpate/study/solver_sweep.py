@@ -51,9 +51,7 @@ def sweep_solver(
     common = {"progress": progress, "case_limit": problem.limit + READING}
     train = {"samples": study.sweep.samples, "seed": study.sweep.seed, "design": study.sweep.design}
     further = {"samples": study.test.random, "seed": study.test.seed, "design": "random"}
-    announce(
-        f"Runs for each case, without a shell, in a folder below {problem.cases}:\n  {problem.shown_command()}"
-    )
+    announce(f"Runs for each case:\n  {problem.shown_command()}")
     with OnDemandCluster(study.sweep.workers) as cluster:
 
         def solved(path: Path, wanted: dict[str, Any]) -> Dataset:

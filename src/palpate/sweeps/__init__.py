@@ -14,6 +14,7 @@
 
     command_problem.py  a problem that another program solves, once for each case
     template_files.py   its input files, made of templates; program_run.py starts and ends it
+    umbridge_problem.py a problem that a model of UM-Bridge solves
     answer_files.py     answers of a case, kept until the sweep is whole
 """
 

@@ -133,10 +133,10 @@ class CommandProblem:
         return _CommandSolver(self)
 
     def shown_command(self) -> str:
-        """Return the command as a person would type it."""
+        """Return the command as a person would type it, with the folder that it is started in."""
         import shlex
 
-        return shlex.join(self._words("{case}"))
+        return f"{shlex.join(self._words('{case}'))}\n  without a shell, in {self.cases}{os.sep}{{case}}"
 
     @property
     def program(self) -> str:

@@ -15,7 +15,7 @@ from palpate.dataset.readers.results import Column, Results
 from palpate.errors import UsageError
 from palpate.units import Range
 
-__all__ = ["mapping_of_outputs", "read_case", "results_of_arrays"]
+__all__ = ["mapping_of_outputs", "read_case", "read_numbers"]
 
 
 def mapping_of_outputs(
@@ -74,11 +74,16 @@ def _mapped(results: Results, row: int, mapping: ImportMapping, x: np.ndarray) -
     return map_cases(replace(results, cases=1, columns=columns), mapping)
 
 
-def results_of_arrays(columns: Mapping[str, np.ndarray], source: str) -> Results:
-    """Return the numbers of one case that came by other ways than a file, (k,) for each name, as results."""
+def read_numbers(
+    columns: Mapping[str, np.ndarray], source: str, mapping: ImportMapping, x: np.ndarray
+) -> MappedCases:
+    """Return what a mapping takes of vectors (k,) by name, which came for the inputs `x` (n,) without a file.
+
+    The numbers of a vector are the columns ``NAME.0``, ``NAME.1`` and so on; one number alone is ``NAME``.
+    """
     named = {}
     for name, values in columns.items():
-        for i, value in enumerate(np.atleast_1d(values)):
-            own = name if np.size(values) == 1 else f"{name}.{i}"
+        for i, value in enumerate(values):
+            own = name if len(values) == 1 else f"{name}.{i}"
             named[own] = Column(own, np.array([float(value)]))
-    return Results((Path(source),), "numbers", 1, named)
+    return _mapped(Results((Path(source),), "numbers", 1, named), 0, mapping, x)

@@ -1,6 +1,7 @@
-"""`palpate.learn`: a dataset of solves made into a body that is felt and seen.
+"""`palpate.learn`: a dataset of solves made into a surrogate: what a hand feels where there is one, fields, numbers.
 
-What a dataset is of is asked once, here: of the recognisers of palpate, and of all registered baselines.
+What a dataset is of is asked once, here: of the recognisers of palpate, and of all registered baselines. Where nothing
+that a hand feels is recognised, its numbers, fields and curves are learnt as they are.
 """
 
 from __future__ import annotations
@@ -13,15 +14,18 @@ from typing import Any
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
 from palpate.format import count, share
+from palpate.learning.arrays.fit import fit
+from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.bent_body import BentSolves
+from palpate.learning.dataset_answers import DatasetAnswers
 from palpate.learning.energy import EnergyHistory, learn_energy
-from palpate.learning.fields import LearntField, learn_snapshots, lumped_mass
+from palpate.learning.fields import LearntField, LearntModes, learn_modes, learn_snapshots, lumped_mass
 from palpate.learning.learning_history import History
 from palpate.learning.pad_fit import fit_pad
 from palpate.learning.pad_solves import is_padded, pad_solves
 from palpate.learning.pressed_solves import PressedSolves, is_pressed
 from palpate.learning.search import Budget
-from palpate.options import FieldOptions, SearchOptions, takes
+from palpate.options import FieldOptions, FitOptions, SearchOptions, takes
 from palpate.surrogates import Baseline, ContactLaw, Solves, Surrogate
 from palpate.surrogates.baselines import registered_baselines
 
@@ -41,10 +45,15 @@ class LearningHistory:
 
     Attributes
     ----------
-    energy : EnergyHistory
-        Every network that was tried for the energy, and the error of each solve when it is left out.
-    fields : mapping of name to LearntField
+    energy : EnergyHistory, optional
+        Every network that was tried for the energy, and the error of each solve when it is left out; None where no
+        hand feels anything.
+    fields : mapping of name to LearntField or LearntModes
         The same of each field.
+    quantities : mapping of name to Fitted
+        The same of each group of numbers.
+    notes : tuple of str
+        What was left out of the dataset, and why.
     solves : int
         Number of solves that were learnt from.
     seconds : float
@@ -53,13 +62,22 @@ class LearningHistory:
         Record of the sequential filter, of a body that loads bend.
     """
 
-    energy: EnergyHistory
+    energy: EnergyHistory | None
     solves: int
     seconds: float
-    fields: Mapping[str, LearntField] = field(default_factory=dict)
+    fields: Mapping[str, LearntField | LearntModes] = field(default_factory=dict)
     filter: History | None = None
+    quantities: Mapping[str, Fitted] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
+        if self.energy is None:
+            lines = [f"{self.solves} solves, learnt in {self.seconds:.0f} s", *self.notes]
+            lines += [
+                f"{name}: error {share(one.heldout)} of its spread on solves left out"
+                for name, one in self.quantities.items()
+            ]
+            return "\n  ".join([*lines, *map(str, self.fields.values())])
         tried = len(self.energy.trials)
         words = f"{self.solves} solves, {tried} networks of the energy tried in {self.seconds:.0f} s"
         left = self.energy.meta.get("left_out", {})
@@ -69,6 +87,8 @@ class LearningHistory:
                 f"{share(left['p95'])} (95th percentile)"
             )
         for name, learnt in self.fields.items():
+            if isinstance(learnt, LearntModes):
+                continue
             missed = learnt.truncation
             size = (
                 f"{1e3 * missed:.2g} mm" if learnt.field.unit == "m" else f"{missed:.2g} {learnt.field.unit}"
@@ -109,14 +129,18 @@ def learn(
     options: SearchOptions,
     **further: Any,
 ) -> tuple[Surrogate, LearningHistory]:
-    """Learn a body that can be felt and seen from a dataset of solves.
+    """Learn a surrogate from a dataset of solves.
+
+    Of a body under a probe, a pad or loads it is what a hand feels and an eye sees; of any other dataset its numbers,
+    its fields over nodes or cells, and its curves along an axis such as time.
 
     Parameters
     ----------
     train : Dataset
-        Of ``palpate.sweep(body, …)``; rows that did not converge are left out. The body's symmetry stands in it.
+        Of ``palpate.sweep(body, …)`` or `palpate.import_results`; rows that did not converge are left out. The body's
+        symmetry stands in it.
     name : str
-        The body's name, for its record and its page.
+        The surrogate's name, for its record and its page.
     layout : Layout, optional
         Of a mesh that is fine wherever the body shall be touched, where the sweep's is fine in a part only.
     shape : bool
@@ -143,7 +167,7 @@ def learn(
     Raises
     ------
     UsageError
-        If no baseline recognises the data, it lacks energies, or has too few solves or none in contact.
+        If the data lack energies where a hand touches, have too few solves or none in contact, or nothing to learn.
     """
     if not isinstance(train, Dataset):
         raise UsageError(
@@ -153,8 +177,10 @@ def learn(
         )
     budget, began = Budget.of(options.effort, options.seconds), time.monotonic()
     solves = len(train.ok)
-    log(f"energy of {count(solves, 'solve')}")
     known = _recognise(train, layout, options, further)
+    if known is None:
+        return _learn_answers(train, name, options, log)
+    log(f"energy of {count(solves, 'solve')}")
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
 
     def limit(share: float) -> float | None:
@@ -179,18 +205,76 @@ def learn(
 
 def _recognise(
     train: Dataset, layout: Layout | None, search: SearchOptions, options: Mapping[str, Any]
-) -> _Recognised:
-    """Return the first kind of body that a dataset is of; registered baselines are asked last."""
+) -> _Recognised | None:
+    """Return the first kind of body that a dataset is of, registered baselines last; None where no hand feels it."""
     for kind in (_recognise_bent, _recognise_pressed, _recognise_held, _recognise_registered):
         known = kind(train, layout, search, dict(options))
         if known is not None:
             return known
-    acting = train.provenance.get("problem", {}).get("interactions", [])
-    raise UsageError(
-        "This dataset is of no kind that can be learnt.",
-        why=f"On its body act {acting or 'no interactions that its provenance tells'}; no baseline recognises that.",
-        fix="Sweep a body under one probe or one glued pad, or register a baseline with `recognise`.",
+    if options:
+        raise UsageError(
+            f"The option {next(iter(options))!r} is of bodies that a hand feels.",
+            why="No baseline recognises this dataset, so its numbers and fields are learnt.",
+            fix="Leave it out, or register a baseline with `recognise`.",
+        )
+    return None
+
+
+def _learn_answers(
+    train: Dataset, name: str, options: SearchOptions, log: Log
+) -> tuple[Surrogate, LearningHistory]:
+    """Learn the numbers, fields and curves of a dataset that no hand feels."""
+    budget, began = Budget.of(options.effort, options.seconds), time.monotonic()
+    answers = DatasetAnswers.of(train)
+    numbers: dict[str, Fitted] = {}
+    fields: dict[str, LearntModes] = {}
+    for group, part in answers.numbers.items():
+        log(group)
+        search = _fit_options(options, budget, len(answers.numbers) + len(answers.fields) - len(numbers))
+        numbers[group] = fit(answers.X, part.values, list(answers.inputs), list(part.outputs), options=search)
+    for shown, one in answers.fields.items():
+        log(f"{shown} at {one.places}")
+        search = _fit_options(options, budget, len(answers.fields) - len(fields))
+        fields[shown] = learn_modes(
+            answers.X,
+            one.values,
+            inputs=answers.inputs,
+            places=one.places,
+            name=shown,
+            unit=one.unit,
+            components=one.components,
+            options=search,
+        )
+    meta = {
+        "name": name,
+        "solves": len(answers.X),
+        "dataset": {"hash": train.ok.hash, "provenance": train.provenance},
+        "left_out": {
+            **{f"{group}, error of its spread": one.heldout for group, one in numbers.items()},
+            **{
+                f"{shown}, error of its range, 95th percentile": one.relative for shown, one in fields.items()
+            },
+        },
+    }
+    surrogate = Surrogate(
+        fields={shown: one.field for shown, one in fields.items()},
+        meta=meta,
+        quantities={
+            group: part for group, one in numbers.items() for part in one.surrogate().quantities.values()
+        },
     )
+    spent = time.monotonic() - began
+    return surrogate, LearningHistory(
+        None, len(answers.X), spent, fields, quantities=numbers, notes=answers.notes
+    )
+
+
+def _fit_options(options: SearchOptions, budget: Budget, left: int) -> FitOptions:
+    """Return the options of a fit that takes its share of the time, so many fits being left."""
+    seconds = None if options.seconds is None else max(budget.left / left, 0.1)
+    workers = 1 if options.workers is None else options.workers
+    effort = FitOptions().effort * options.effort
+    return FitOptions(effort=effort, seconds=seconds, workers=workers, seed=options.seed)
 
 
 def _take(options: dict[str, Any], *names: str) -> dict[str, Any]:

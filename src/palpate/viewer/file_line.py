@@ -33,7 +33,7 @@ def line_facts(line: NodeField, surrogate: Surrogate) -> dict[str, Any]:
     """Return what the page must know of a line beside its network, as JSON."""
     low, high = bounds(line.inputs)
     return {
-        "directions": surrogate.energy.baseline.directions.tolist(),
+        "directions": surrogate.hand_energy.baseline.directions.tolist(),
         "touched": line.touched.tolist(),
         "further": list(line.further),
         "by_place": line.asked_by == "place and load",

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import exported_bodies
+from answering import answering
 from palpate.cli import main
 from palpate.errors import ResourceError, StudyError, UsageError
 from palpate.export.umbridge_server import UMBridgeServer, served_models
@@ -108,6 +109,15 @@ def test_slopes_are_those_of_the_values(umbridge):
         curved = (slope(x + step * vec) - slope(x - step * vec)) / (2 * step)
         hessian = model.apply_hessian(0, 0, 0, [x.tolist()], sens.tolist(), vec.tolist())
         np.testing.assert_allclose(hessian, curved, rtol=1e-5, atol=1e-7)
+
+
+def test_quantities_are_served_by_the_name_of_their_group(umbridge):
+    surrogate = answering()
+    (name, part), *_ = surrogate.quantities.items()
+    with serving(served_models(surrogate)) as server:
+        model = umbridge.HTTPModel(server.url, name)
+        x = np.array([(r.low + r.high) / 2 for r in surrogate.inputs])
+        np.testing.assert_array_equal(model([x.tolist()])[0], part.predict(x[None])[0])
 
 
 def post(url, path, content, **headers):

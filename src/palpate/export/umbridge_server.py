@@ -1,14 +1,15 @@
 """Learnt files as models of UM-Bridge, over HTTP on this machine: values, slopes, and actions of the Hessian.
 
 A body that is touched is served as ``energy`` (J) and ``force`` (N) of two vectors: the felt coordinates, then the
-further inputs, if there are any. A network alone is served as ``outputs`` of one vector. All is in SI units.
+further inputs, if there are any. Quantities are served under the names of their groups, a network alone as ``outputs``.
+All is in SI units.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.network import Network
-from palpate.surrogates import Surrogate
+from palpate.surrogates import LearntQuantities, Surrogate
 from palpate.version import __version__
 
 __all__ = ["HOST", "ServedModel", "UMBridgeServer", "served_models"]
@@ -50,19 +51,22 @@ class ServedModel:
 def served_models(model: Any) -> dict[str, ServedModel]:
     """Return the models by name that a loaded file is served as; a file that has none is refused."""
     if isinstance(model, Surrogate):
-        return _touched(model)
-    network = model if isinstance(model, Network) else getattr(model, "network", None)
-    if isinstance(network, Network):
-        return {"outputs": _numbers(network)}
-    raise UsageError(
-        f"A {type(model).__name__} can't be served.",
-        why="It is neither a learnt body nor a network.",
-        fix="Name a file that `palpate learn` or `palpate fit` wrote.",
-    )
+        served = _touched(model) if model.can_be_touched else {}
+        served |= {name: _quantities(part) for name, part in model.quantities.items()}
+    else:
+        network = model if isinstance(model, Network) else getattr(model, "network", None)
+        served = {"outputs": _numbers(network)} if isinstance(network, Network) else {}
+    if not served:
+        raise UsageError(
+            f"A {type(model).__name__} without energy and without quantities can't be served.",
+            why="UM-Bridge's models answer a few numbers, not fields.",
+            fix="Learn numbers too: map one place of a field, or its largest value, by `at` or `reduce`.",
+        )
+    return served
 
 
 def _touched(body: Surrogate) -> dict[str, ServedModel]:
-    energy = body.energy
+    energy = body.hand_energy
     directions = np.asarray(energy.baseline.directions, dtype=float)
     felt, further = len(directions), len(body.inputs) - len(directions)
     sizes = (felt, further) if further else (felt,)
@@ -89,6 +93,10 @@ def _touched(body: Surrogate) -> dict[str, ServedModel]:
         ),
         "force": ServedModel(sizes, felt, force, stiffness, None, inside, (*units, *["N"] * felt)),
     }
+
+
+def _quantities(part: LearntQuantities) -> ServedModel:
+    return replace(_numbers(part.network), inside=lambda x: bool(part.trusted(x[None])[0]))
 
 
 def _numbers(network: Network) -> ServedModel:

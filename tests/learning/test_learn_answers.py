@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
@@ -52,23 +50,6 @@ def test_cells_and_vectors_are_learnt_too():
         assert abs(values - wanted).max() < 0.01 * np.ptp(wanted)
     assert rod.fields["in_cells"].places.kind == "cells"
     assert rod.fields["flux"].components == ("1", "2")
-
-
-@pytest.mark.full
-def test_the_three_commands(palpate, tmp_path):
-    rod_solves(names=("largest", "rise")).save(tmp_path / "rod.zarr")
-    rod_solves(40, seed=3, names=("largest", "rise")).save(tmp_path / "rod-test.zarr")
-    assert palpate("learn", tmp_path / "rod.zarr").code == 0
-    file = tmp_path / "rod.palpate"
-    said = palpate("ask", file, "--at", "300000,20")
-    assert said.code == 0
-    content = json.loads(palpate("ask", file, "--at", "300000,20", "--json").out)
-    (one,) = content["answers"]
-    assert one["outputs"]["largest"] == pytest.approx(3e5 * 0.01 / 8 / 20, rel=0.02)
-    assert one["fields"]["rise"]["least"] == pytest.approx(0.0, abs=0.2)
-    judged = json.loads(palpate("validate", file, "--json").out)
-    assert [one["name"] for one in judged["answers"]] == ["largest", "rise"]
-    assert "rise, worst case" in file.with_suffix(".html").read_text("utf-8")
 
 
 def test_what_can_not_be_told_apart_is_refused_by_name():

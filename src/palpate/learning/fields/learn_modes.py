@@ -153,19 +153,9 @@ def learn_modes(
         "left_out_p95": float(np.quantile(sizes, 0.95)),
         "range": float(np.ptp(values, axis=(0, 1)).max()),
     }
-    learnt = fitted.surrogate().quantities
-    field = ModalField(
-        name,
-        unit,
-        places,
-        next(iter(learnt.values())),
-        mean,
-        modes,
-        scatter,
-        widening,
-        tuple(components),
-        meta,
-    )
+    coefficients = next(iter(fitted.surrogate().quantities.values()))
+    parts = (coefficients, mean, modes, scatter, widening, tuple(components), meta)
+    field = ModalField(name, unit, places, *parts)
     return LearntModes(field, fitted, sizes)
 
 

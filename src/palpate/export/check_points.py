@@ -388,7 +388,7 @@ def _stroke(surrogate: Surrogate, asker: Asker, precision: Precision) -> dict[st
 
 def compare_rest(surrogate: Surrogate, export: Releaser) -> Difference:
     """Return how far the places are from palpate where a body lies that was led about and let go."""
-    energy, memory, rng = surrogate.energy, surrogate.memory, np.random.default_rng(3)
+    energy, memory, rng = surrogate.hand_energy, surrogate.memory, np.random.default_rng(3)
     assert memory is not None
     low, high = bounds(energy.inputs)
     D = energy.baseline.directions

@@ -6,7 +6,7 @@ What a dataset is of is asked once, here: of the recognisers of palpate, and of 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -93,6 +93,8 @@ class _Recognised:
     solves: Solves
     options: Mapping[str, Any]  # of learning its energy
     learn_field: Callable[[FieldOptions], LearntField] | None = None
+    # gives other forms of the baseline
+    rivals: Callable[[], Sequence[Baseline]] | None = None
     fields: Mapping[str, Any] = field(default_factory=dict)  # that are learnt already
     meta: Mapping[str, Any] = field(default_factory=dict)
     filter: History | None = None
@@ -163,7 +165,7 @@ def learn(
 
     first = limit(1.0 / (1.0 + _FIELD_SHARE * len(fields)))
     searches = vars(options) | {"seconds": first} | dict(known.options)
-    energy, found = learn_energy(known.solves, known.baseline, **searches)
+    energy, found = learn_energy(known.solves, known.baseline, rivals=known.rivals, **searches)
     learnt: dict[str, LearntField] = {}
     for i, shown in enumerate(fields):
         assert known.learn_field is not None
@@ -249,7 +251,9 @@ def _recognise_pressed(
     elif length is not None:
         baseline = replace(baseline, law=ContactLaw("series", length))
     known = {"deepest": pressed.deepest or None}
-    return _Recognised(baseline, pressed.solves, known | options, learn_field)
+    # a law that was asked for is taken as it is
+    rivals = None if options.get("choose") is False else pressed.overlap_baselines
+    return _Recognised(baseline, pressed.solves, known | options, learn_field, rivals)
 
 
 def _recognise_held(

@@ -399,8 +399,20 @@ class PartOptions(Options):
         above=0,
         bare=False,
     )
+    element: str | None = option(
+        None,
+        "size of elements under the ball, such as 3 mm; or auto: smaller ones where finer solves show that it pays. "
+        "Default: by the part's size",
+    )
     held: tuple[str, ...] = option(
         (), "surface of the file that is held. Several times. Default: what it stands on"
     )
     touched: str | None = option(None, "surface of the file that is touched. Default: what faces up")
+    wrap: float | None = option(
+        None,
+        "size by which a closed surface is laid around one that cuts itself or has holes. Default: none",
+        "m",
+        above=0,
+        bare=False,
+    )
     name: str | None = option(None, "name of the study and of its files. Default: that of the part")

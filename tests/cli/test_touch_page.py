@@ -24,7 +24,7 @@ from websockets.sync.client import connect
 
 import pressed
 from palpate.cli.console import Console
-from palpate.cli.improvement_lines import trial_in_words
+from palpate.cli.improvement_lines import mesh_in_words, trial_in_words
 from palpate.cli.touch_page import TouchedPart
 from palpate.errors import UsageError
 from palpate.runtime import warm_up
@@ -73,6 +73,7 @@ class Improvement:
             train=pressed.dataset(pressed.solves()), test=pressed.dataset(pressed.solves()),
             surrogate=pressed.surrogate() if paths.model.exists() else None,
             model_path=paths.model if paths.model.exists() else None, before=math.nan, tried=math.nan,
+            mesh=math.nan,
         )  # fmt: skip
 
 
@@ -134,6 +135,14 @@ def test_the_studys_own_surrogate_is_compared_with_the_rough_one_on_the_same_sol
 def test_a_new_surrogate_is_told_beside_the_one_before(is_new, before, tried, words):
     step = SimpleNamespace(is_new=is_new, before=before, tried=tried, unseen=20)
     assert trial_in_words(step).replace("\N{NO-BREAK SPACE}", " ") == words
+
+
+def test_the_mesh_s_part_stands_in_the_error_that_is_told():
+    step = SimpleNamespace(error=0.007, mesh=0.012)
+    assert (
+        mesh_in_words(step).replace("\N{NO-BREAK SPACE}", " ") == "force ± 1.9 % in all, of it the mesh 1.2 %"
+    )
+    assert mesh_in_words(SimpleNamespace(error=0.007, mesh=math.nan)) == ""
 
 
 def test_the_same_command_goes_on_with_what_there_is(study, tmp_path, monkeypatch):

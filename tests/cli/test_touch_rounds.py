@@ -73,6 +73,7 @@ def test_one_part_has_several_studies_by_their_names(palpate, asked, tmp_path):
         (("--poisson", "0.4"), "poisson"),
         (("--radius", "7 mm"), "radius"),
         (("--depth", "1 mm"), "depth"),
+        (("--element", "0.3 mm"), "element"),
         (("--held", "face 5"), "fixed"),
         (("--touched", "face 2"), "touches"),
     ],

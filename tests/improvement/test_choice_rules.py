@@ -16,7 +16,7 @@ from palpate.improvement.choice_rules import (
     image_distances,
 )
 from palpate.improvement.force_model import ForceModel
-from palpate.improvement.gradient_process import Observations
+from palpate.learning.gradient_process import Observations
 from palpate.rbf.symmetric_units import Images
 from palpate.surrogates import ContactBaseline, ContactLaw, Solves, TouchedSurface
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from palpate.improvement.gradient_process import (
+from palpate.learning.gradient_process import (
     LEVEL,
     SLOPE,
     GradientProcess,

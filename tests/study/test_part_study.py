@@ -322,6 +322,10 @@ def test_a_part_goes_the_whole_way(folder, tmp_path):
     assert (last.solves, last.unseen) == (12, 2), "every solve converged"
     outcome = conclude(study, paths, last)
     assert last.error == outcome.validation.force.p95
+    # both unseen touches were solved on finer elements too, and are not solved again
+    assert last.mesh == pytest.approx(outcome.validation.mesh_part)
+    assert outcome.model.meta["validation"]["force error, the mesh's part"] == last.mesh
+    assert paths.finer.exists()
     body = Surrogate.load(paths.model)
     felt = np.linalg.norm(outcome.train.force, axis=1)
     off = np.linalg.norm(body.energy.force(outcome.train.X) - outcome.train.force, axis=1) / felt

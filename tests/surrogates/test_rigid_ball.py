@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from palpate import Body, SphereProbe, materials
+from palpate.format import bind_units
 from palpate.physics.shapes import Block
 from palpate.surrogates.model_card import card_of
 from palpate.surrogates.rigid_ball import pad_part, pad_part_of
@@ -62,7 +63,7 @@ def test_card_report_and_page_say_the_same():
     assert part.depth == pytest.approx(DEEPEST / 2, rel=0.02)
     assert 0 < part.depth_share < 1
     assert str(part) in card_of(model).limits
-    assert PageModel(touchable(model)).pad_words == str(part)
+    assert PageModel(touchable(model)).pad_words == bind_units(str(part))
     test = solves()
     chapter = Chapter("slab", model, test, validate(model, test), train=dataset(test))
     assert any(fact.meaning == str(part) for fact in story(chapter).facts)

@@ -17,6 +17,7 @@ from palpate.validation.figures.loop_work import work_of_polygons
 from palpate.validation.figures.smoothness import STEP
 from palpate.validation.limits import FAINT_JND, FORCE_JND, Limits
 from palpate.validation.unseen_solves import force_jnd
+from palpate.validation.verdict import verdict
 from pressed import (
     DEEPEST,
     INPUTS,
@@ -230,6 +231,24 @@ def test_the_worst_cases_are_named_with_their_inputs_and_forces() -> None:
     assert "worst 1: 5 %" in str(v)
 
 
+def test_a_mesh_beyond_its_limit_keeps_a_surrogate_from_passing() -> None:
+    """Three touches on a finer mesh suffice, of which the worst counts; verdict and file tell the mesh's part."""
+    test = solves()
+    heavy = np.flatnonzero(np.linalg.norm(test.force, axis=1) > 0.5)[:3]
+    fine = TouchSolves(test.X[heavy], test.force[heavy] * np.array([1.0, 0.97, 1.01])[:, None])
+    part = 4 / 3 * 0.03 / 0.97
+    loose, strict = (
+        validate(surrogate(), test, refined=fine, limits=Limits(mesh_force=m)) for m in (0.05, 0.035)
+    )
+    assert loose.mesh_part == pytest.approx(part)
+    assert "mesh_force" not in missed(loose)
+    assert "mesh_force" in missed(strict)
+    assert "element" in strict.failures[0].criterion.fix
+    assert "force ± 4.1 % in all, of it the mesh 4.1 %" in verdict(loose)[1]
+    assert loose.summary()["force error, the mesh's part"] == pytest.approx(part)
+    assert validate(surrogate(), test).mesh_part is None
+
+
 @pytest.mark.full
 def test_the_mesh_s_own_error_stands_apart() -> None:
     """The refined body is 5 % stiffer: an exact surrogate of the coarse one is then off by 1 − 1/1.05."""
@@ -241,6 +260,9 @@ def test_the_mesh_s_own_error_stands_apart() -> None:
         assert value == pytest.approx(1 - 1 / 1.05)
     assert v.mesh.paired == v.mesh.count
     assert "the mesh alone is off by 4.8 % median" in str(v)
+    # an error C h² differs from C (h/2)² by three quarters of itself
+    assert v.mesh_part == pytest.approx(4 / 3 * (1 - 1 / 1.05))
+    assert v.whole_force_error == pytest.approx(v.force.p95 + v.mesh_part)
     apart = validate(surrogate(), solves(), refined=TouchSolves(places(9, seed=1), force(places(9, seed=1))))
     assert apart.mesh is not None
     assert apart.mesh.paired == 0

@@ -37,6 +37,7 @@ TOUCHED = {
     "loop_work",
     "border_loop_work",
     "smoothness",
+    "mesh_force",
     "refined_force_median",
     "refined_force_p95",
 }

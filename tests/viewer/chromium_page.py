@@ -5,6 +5,7 @@ Chromium draws in software here; every wait is for a state and not for a time.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,25 @@ def open_page(
     page.goto(viewer.url)
     page.wait_for_selector(f"html[data-tick][data-{ready}]")
     return page
+
+
+def open_file(browser: Browser, file: Path) -> tuple[Page, list[str]]:
+    """The page of a file in a browser without a network, and what the browser complains of."""
+    page, complaints = (
+        browser.new_context(viewport={"width": 1200, "height": 800}, offline=True).new_page(),
+        [],
+    )
+    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on(
+        "request",
+        lambda request: (
+            None if request.url.startswith(("file:", "data:", "blob:")) else complaints.append(request.url)
+        ),
+    )
+    page.goto(file.as_uri())
+    page.wait_for_function("['middle', 'tip'].some((place) => place in document.documentElement.dataset)")
+    return page, complaints
 
 
 def assert_no(complaints: list[str]) -> None:

@@ -12,19 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bodies import loaded_twice
-from chromium_page import assert_no
+from chromium_page import assert_no, open_file
 from playwright.sync_api import Browser, Page
 from slabs import carried_slab, dents, family, touched_slab
 
-import bent
-from palpate.errors import UsageError
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
 from palpate.viewer import file_page
 from palpate.viewer.file_page import export_html
 from palpate.viewer.indentation_drawing import IndentationDrawing
 
-VIEWPORT = {"width": 1200, "height": 800}
 ASK = """(X) => {
   const { evaluator } = palpate;
   return X.map((x) => {
@@ -53,22 +50,6 @@ KEPT = """() => {
 def pressed() -> Surrogate:
     """A slab that relaxes, with a further input."""
     return replace(family(), meta={"name": "slab"})
-
-
-def open_file(browser: Browser, file: Path) -> tuple[Page, list[str]]:
-    """The page of a file in a browser without a network, and what the browser complains of."""
-    page, complaints = browser.new_context(viewport=VIEWPORT, offline=True).new_page(), []
-    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on(
-        "request",
-        lambda request: (
-            None if request.url.startswith(("file:", "data:", "blob:")) else complaints.append(request.url)
-        ),
-    )
-    page.goto(file.as_uri())
-    page.wait_for_function("['middle', 'tip'].some((place) => place in document.documentElement.dataset)")
-    return page, complaints
 
 
 @pytest.fixture(scope="module")
@@ -191,14 +172,6 @@ def test_a_further_input_of_a_line_is_a_slider_that_bends_it(opened_line: tuple[
     slider.fill("2")
     page.wait_for_function("(tip) => document.documentElement.dataset.tip !== tip", arg=before)
     assert_no(complaints)
-
-
-def test_a_page_is_refused_where_its_rest_moves(tmp_path: Path):
-    body = bent.body()
-    with pytest.raises(UsageError, match="lies elsewhere"):
-        export_html(body, tmp_path / "rod.html")
-    assert body._repr_html_() is None
-    assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.full

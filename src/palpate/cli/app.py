@@ -22,6 +22,7 @@ from palpate.cli.table_options import Force, Json, Verbose, with_table_options
 from palpate.cli.touch_command import touch
 from palpate.cli.touch_options import DeadMan, Device, NoController, Unsoftened
 from palpate.cli.trace_commands import replay, trace_app
+from palpate.cli.umbridge_command import serve_umbridge
 from palpate.errors import UsageError
 from palpate.processes import CASE_LIMIT
 
@@ -151,6 +152,10 @@ def learn(
         float | None,
         number_option("--effort", least=0.01, help="Of a dataset: how much is tried; 0.1 is a quick look."),
     ] = None,
+    leave_out: Annotated[
+        list[int] | None,
+        typer.Option(help="Number of a solve that is not learnt from, as learning names it. Several times."),
+    ] = None,
     watch: Annotated[
         bool,
         typer.Option(
@@ -164,7 +169,7 @@ def learn(
     """Learn a surrogate from the solves of a study, check it, and write it to a model file."""
     from palpate.cli.study_commands import learn_path
 
-    learn_path(study, effort, Console(as_json), watch=watch)
+    learn_path(study, effort, Console(as_json), watch=watch, leave_out=tuple(leave_out or ()))
 
 
 @app.command()
@@ -330,6 +335,7 @@ app.command()(touch)
 app.command()(fit)
 app.command()(correct)
 app.command()(card)
+app.command("serve-umbridge")(serve_umbridge)
 dataset_app.command("export")(export_dataset)
 
 

@@ -21,8 +21,10 @@ _KEYS = {
     "poisson": ("body", "material", "poisson"),
     "radius": ("interaction", "radius"),
     "depth": ("interaction", "depth"),
+    "element": ("sweep", "element"),
     "held": ("body", "fixed"),
     "touched": ("interaction", "touches"),
+    "wrap": ("body", "wrap"),
 }
 """Key of a study file that says each option of a part."""
 
@@ -32,6 +34,8 @@ def require_same(file: Path, study: Study, choices: PartOptions) -> None:
     from palpate.study.toml import key_line
 
     stated = _choices_of(study)
+    if choices.element is not None:  # what was measured once stays
+        stated["element"] = _element_words(stated.get("element"), choices.element)
     differing = [
         name
         for name, keys in _KEYS.items()
@@ -90,12 +94,23 @@ def _choices_of(study: Study) -> dict[str, Any]:
     if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord):
         return {}
     said: dict[str, Any] = {"radius": acting.radius, "depth": acting.depth[1], "touched": acting.touches}
-    said |= {"unit": body.unit, "held": body.fixed_names()}
+    said |= {"wrap": body.wrap, "unit": body.unit, "held": body.fixed_names()}
+    said["element"] = getattr(study.sweep, "element", None)
     if isinstance(body.material, str):
         said["material"] = body.material
     elif isinstance(body.material, SolidMaterialRecord):
         said |= {"young": body.material.young, "poisson": body.material.poisson}
     return said
+
+
+def _element_words(stated: float | None, wanted: str) -> str:
+    """Return the wanted element as it was typed where a study states the same, or where solves decided it."""
+    from palpate.study.part_study import AUTO
+    from palpate.units import parse_quantity
+
+    if wanted == AUTO:
+        return wanted
+    return wanted if _are_equal(stated, parse_quantity(wanted, "m", "--element", bare=False)) else ""
 
 
 def _are_equal(one: Any, other: Any) -> bool:

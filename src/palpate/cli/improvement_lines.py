@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from palpate.study.run import Outcome, Paths
     from palpate.sweeps import Scheduler
 
-__all__ = ["improve_and_print", "improve_file", "step_line", "trial_in_words"]
+__all__ = ["improve_and_print", "improve_file", "mesh_in_words", "step_line", "trial_in_words"]
 
 
 def improve_file(
@@ -77,10 +77,14 @@ def improve_and_print(
         if step.phase == "judged" or (step.phase == "learnt" and (steps or not step.unseen)):
             console.say(step_line(step))
             if step.unseen:
-                steps.append({"solves": step.solves, "force_p95": step.error, "seconds": step.seconds})
+                figures = {"solves": step.solves, "force_p95": step.error, "seconds": step.seconds}
+                steps.append(figures | ({} if math.isnan(step.mesh) else {"mesh_part": step.mesh}))
     assert last is not None
     outcome = conclude(study, paths, last)
     content = {"steps": steps, "reached": last.reached, "reason": last.reason, "model": str(paths.model)}
+    content |= outcome.model.meta.get("painted", {})  # areas in m²
+    if (part := outcome.validation.mesh_part) is not None:
+        content |= {"mesh_part": part, "whole_force_p95": outcome.validation.whole_force_error}
     return outcome, content, None if last.reached else _failure(study, options.until, last)
 
 
@@ -88,7 +92,7 @@ def step_line(step: Any) -> str:
     """Return the figures of an `ImprovementStep` as a line."""
     if not step.unseen or math.isnan(step.error):
         return f"{count(step.solves, 'solve')}: a first surrogate, not judged yet, after {duration(step.seconds)}"
-    trial = f"; {words}" if (words := trial_in_words(step)) else ""
+    trial = "".join(f"; {words}" for words in (trial_in_words(step), mesh_in_words(step)) if words)
     return (
         f"{step.solves} solves: force error {share(step.median)} at the median, {share(step.error)} at the 95th "
         f"percentile of {count(step.unseen, 'unseen solve')}, after {duration(step.seconds)}{trial}"
@@ -104,6 +108,13 @@ def trial_in_words(step: Any) -> str:
         return f"kept, since a new one has {share(step.tried)}, not {share(step.before)}, {same}"
     verb = "improved" if step.tried < step.before else "replaced"
     return f"{verb}: {share(step.before)} → {share(step.tried)} {same}"
+
+
+def mesh_in_words(step: Any) -> str:
+    """Return the force error with the mesh's part of it; "" where no finer mesh was solved."""
+    from palpate.validation.verdict import whole_error_in_words
+
+    return whole_error_in_words(step.error + step.mesh, step.mesh)
 
 
 def _failure(study: Study, until: float, last: ImprovementStep) -> AccuracyError:

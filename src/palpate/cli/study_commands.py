@@ -104,10 +104,13 @@ def sweep_file(
     console.result("\n".join(lines), content | {"rows": sum(map(len, parts)), "failed": failed})
 
 
-def learn_path(study: Path, effort: float | None, console: Console, *, watch: bool) -> None:
+def learn_path(
+    study: Path, effort: float | None, console: Console, *, watch: bool, leave_out: Sequence[int] = ()
+) -> None:
     """Learn a study file, or a dataset, a folder ``NAME.zarr``.
 
-    The effort is of a dataset's search; `watch` shows the growth of a study's sequential filter.
+    The effort is of a dataset's search; `watch` shows the growth of a study's sequential filter. The solves numbered in
+    `leave_out` are not learnt from.
     """
     if not study.is_dir():
         if effort is not None:
@@ -120,20 +123,22 @@ def learn_path(study: Path, effort: float | None, console: Console, *, watch: bo
                 why=f"Line {number} of {study} says {line}" if number else f"{study} has the default, 1.",
                 fix="Change it there, in [learning], and leave out --effort.",
             )
-        learn_file(study, console, watch=watch)
+        learn_file(study, console, watch=watch, leave_out=leave_out)
         return
     if watch:
         raise UsageError("The growth is watched of a study.", fix="Name the study file, or omit --watch.")
-    learn_dataset_file(study, 1.0 if effort is None else effort, console)
+    learn_dataset_file(study, 1.0 if effort is None else effort, console, leave_out)
 
 
-def learn_file(study: Path, console: Console, *, watch: bool = False) -> None:
+def learn_file(study: Path, console: Console, *, watch: bool = False, leave_out: Sequence[int] = ()) -> None:
     """Learn the dataset of a study file, judge the result, write it and print how good it is.
 
-    `watch` shows the growth of the sequential filter, and writes the page that plays it.
+    `watch` shows the growth of the sequential filter, and writes the page that plays it; the training solves numbered
+    in `leave_out` are not learnt from.
     """
     from palpate.cli.growth_view import watch_growth
     from palpate.study import read_study
+    from palpate.study.mesh_check import load_finer
     from palpate.study.run import Paths, learn_study, load_data, save_model, validate_study, with_validation
     from palpate.study.study_advice import earlier_curve
 
@@ -145,9 +150,14 @@ def learn_file(study: Path, console: Console, *, watch: bool = False) -> None:
     page = paths.folder / f"{record.name}.growth.html" if watch else None
     with watch_growth(page, record.name, console) as recorder:
         model, history = learn_study(
-            record, train, test, log=lambda stage: console.say(f"{stage} …"), watch=recorder
+            record,
+            train,
+            test,
+            log=lambda stage: console.say(f"{stage} …"),
+            watch=recorder,
+            leave_out=leave_out,
         )
-    validation = validate_study(record, model, test, history)
+    validation = validate_study(record, model, test, history, load_finer(record, paths))
     curve = earlier_curve(paths, record.name)
     model = with_validation(model, validation, curve, len(train) if record.memory is None else 0)
     save_model(paths, model, history)
@@ -155,10 +165,16 @@ def learn_file(study: Path, console: Console, *, watch: bool = False) -> None:
     values = {check.criterion.key: check.measured for check in validation.checks}
     console.result(
         "\n".join([str(model), str(history), *lines, *([str(page)] if page else []), str(paths.model)]),
-        {"model": str(paths.model), "passed": validation.passed, "measured": values}
+        {"model": str(paths.model), "passed": validation.passed, "measured": values, **_suspects(model)}
         | ({"growth": str(page)} if page else {}),
     )
     console.say(f"Next: palpate validate {study}, palpate view {paths.model}")
+
+
+def _suspects(model: Any) -> dict[str, Any]:
+    """Return the solves that contradict their neighbours, for --json."""
+    meta = getattr(model, "meta", None) or {}
+    return {"suspects": meta.get("suspects", []), "left_out": meta.get("excluded", [])}
 
 
 _HEADLINES = {"rmse", "filter_rmse", "force_median", "force_p95", "history_force_median", "history_force_p95"}
@@ -172,6 +188,7 @@ def validate_study_file(study: Path, report: bool, console: Console, traces: Seq
     `AccuracyError` tells after everything has been printed and written.
     """
     from palpate.study import read_study
+    from palpate.study.mesh_check import load_finer
     from palpate.study.run import Outcome, Paths, load_data, load_model, report_study, validate_study
     from palpate.study.study_advice import advice_after
     from palpate.validation.report.body_words import solid_words
@@ -181,7 +198,7 @@ def validate_study_file(study: Path, report: bool, console: Console, traces: Seq
     paths = Paths(study.parent, record.name)
     train, test = load_data(record, paths)
     model, history = load_model(paths, train)
-    validation = validate_study(record, model, test, history)
+    validation = validate_study(record, model, test, history, load_finer(record, paths))
     advice = advice_after(record, model, train, validation, study)
     if advice:
         validation = replace(validation, notes=(f"{advice}.", *validation.notes))
@@ -215,10 +232,11 @@ def _beside_full_model(record: Study, traces: Sequence[Path], console: Console) 
     return made
 
 
-def learn_dataset_file(path: Path, effort: float, console: Console) -> None:
+def learn_dataset_file(path: Path, effort: float, console: Console, leave_out: Sequence[int] = ()) -> None:
     """Learn a dataset, a folder ``NAME.zarr``, write the model beside it, and print how it was learnt.
 
-    The effort multiplies the counts of candidates and iterations of the searches.
+    The effort multiplies the counts of candidates and iterations of the searches. The rows numbered in `leave_out` are
+    not learnt from.
     """
     from palpate.dataset import Dataset
     from palpate.learning import learn_dataset
@@ -226,11 +244,17 @@ def learn_dataset_file(path: Path, effort: float, console: Console) -> None:
     data = Dataset.open(path)
     console.say(f"Learning from {len(data.ok)} solves …")
     model, history = learn_dataset(
-        data, name=path.stem, effort=effort, log=lambda stage: console.say(f"{stage} …")
+        data,
+        name=path.stem,
+        effort=effort,
+        leave_out=leave_out,
+        log=lambda stage: console.say(f"{stage} …"),
     )
     target = path.with_suffix(".palpate")
     model.save(target)
-    console.result("\n".join([str(model), str(history), str(target)]), {"model": str(target)})
+    console.result(
+        "\n".join([str(model), str(history), str(target)]), {"model": str(target), **_suspects(model)}
+    )
     console.say(f"Next: palpate validate {target} --test DATA.zarr, palpate view {target}")
 
 

@@ -56,6 +56,7 @@ def touch(
     """Open a part on a page, to be touched while solves and learning improve it. Called again, it goes on."""
     from palpate.cli.console import Console
     from palpate.devices import device_traits
+    from palpate.study.part_study import AUTO, study_file
     from palpate.study.run import Paths
 
     console = Console(as_json, verbose)
@@ -67,7 +68,7 @@ def touch(
         if not part.is_file():
             raise UsageError(f"There is no file {part}.", fix=f"Name {PART_FORMATS}.")
         notes: list[str] = []
-        touched = TouchedPart(until, limit, workers, console)
+        touched = TouchedPart(until, limit, workers, console, refine=choices.element == AUTO)
         with _no_study_of_refusals(part, choices.name):
             touch_on_page(
                 part.stem,
@@ -95,6 +96,8 @@ def touch(
     options = ImprovementOptions(until=until, limit=limit, workers=workers)
     with _no_study_of_refusals(part, choices.name):
         study = _study_of(part, choices, console)
+        if choices.element == AUTO:
+            study = _refined(study, study_file(part, choices.name), workers, console)
         _carry_on(study.with_workers(workers), Paths(part.parent, study.name), options, console)
 
 
@@ -170,6 +173,25 @@ def _study_of(part: Path, choices: PartOptions, console: Console) -> Study:
     console.say("\n".join(filter(None, notes)))
     console.say(f"{chosen_words(study)} {file} says all of it; change it there.")
     return study
+
+
+def _refined(study: Study, file: Path, workers: int | None, console: Console) -> Study:
+    """Return the study of a part with elements that finer solves have chosen; one with solves keeps its elements."""
+    from palpate.study.mesh_check import refine_study
+    from palpate.study.run import Paths
+
+    if Paths(file.parent, study.name).data.exists():
+        return study
+    from palpate.sweeps import local_cluster
+
+    with local_cluster(workers) as cluster:
+        return refine_study(
+            study,
+            file,
+            cluster=cluster,
+            progress=not console.as_json,
+            log=lambda stage: console.say(f"{stage} …"),
+        )
 
 
 def _require_part(study: Study, file: Path, part: Path) -> None:

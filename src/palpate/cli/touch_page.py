@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from palpate.cli.console import Console
-from palpate.cli.improvement_lines import step_line, trial_in_words
+from palpate.cli.improvement_lines import mesh_in_words, step_line, trial_in_words
 from palpate.cli.work_estimate import WorkEstimate
 from palpate.errors import PalpateError, UsageError
 from palpate.format import duration
@@ -78,12 +78,16 @@ class TouchedPart:
     """One part on its page: what a person chooses, the work, and the surrogates that come of it.
 
     `until` is the wanted relative force error, `limit` the time in s after which no further batch of solves begins.
+    With `refine` finer solves decide the size of the elements before the study's own begin.
     `times` are those in s from the making of this object to ``page``, ``start``, ``touch`` and ``end``.
     """
 
     page: PartPage  # to be set before `begin`
 
-    def __init__(self, until: float, limit: float, workers: int | None, console: Console) -> None:
+    def __init__(
+        self, until: float, limit: float, workers: int | None, console: Console, *, refine: bool = False
+    ) -> None:
+        self.refine = refine
         self.until, self.limit, self.workers, self.console = until, limit, workers, console
         self.times: dict[str, float] = {}
         self.exit_code = 0  # of the work, once it has ended: 2 where it refused the study
@@ -118,6 +122,7 @@ class TouchedPart:
             self._begun = True
         self.mark("start")
         wish = {"study": str(file), "until": self.until, "limit": self.limit, "workers": self.workers}
+        wish["refine"] = self.refine
         self._work.ask(json.dumps(wish))
         for target in (self._listen, self._show_bodies, self._heed_stop):
             thread = threading.Thread(target=target, daemon=True)
@@ -189,13 +194,15 @@ class TouchedPart:
         if step.phase in {"learnt", "judged"}:
             self.console.say(step_line(step))
         places = np.array(step.places, dtype=float).reshape(-1, 3)
-        known = {
+        known: dict[str, Any] = {
             "solves": step.solves,
             "error_median": step.median,
             "error_p95": step.error,
             "places": places,
+            **{name: figures[name] for name in ("painted_area", "trained_area") if name in figures},
         }
-        self._show(**known, trial=trial_in_words(step) or self._progress.trial)
+        words = "; ".join(filter(None, (trial_in_words(step), mesh_in_words(step))))
+        self._show(**known, trial=words or self._progress.trial)
 
     def _end(self, outcome: dict[str, Any]) -> None:
         self.mark("end")

@@ -23,6 +23,7 @@ from palpate.export.field_tables import PROMISE, deepest_touches
 from palpate.network import Network
 from palpate.network.network_kernels import regressor_rows_into
 from palpate.surrogates import FieldSurrogate, LearntEnergy, Surrogate
+from palpate.surrogates.moving_rest import MovingRest
 from palpate.units import bounds
 
 __all__ = [
@@ -32,9 +33,11 @@ __all__ = [
     "Difference",
     "ExportedFile",
     "Precision",
+    "Releaser",
     "compare_body",
     "compare_field",
     "compare_network",
+    "compare_rest",
     "condition",
     "places",
     "true_answers",
@@ -54,6 +57,7 @@ _PARTS = {
 _ROUND_OFF = 1e-14  # m, depth that is round-off
 _TOUCHES = 24  # places at which a field is compared, beside the deepest touches
 _STROKE = 300  # steps of a memory's stroke
+_HISTORIES, _PLACES = 24, 6  # histories after which a body is let go, and places of each
 
 
 class Asker(Protocol):
@@ -69,6 +73,14 @@ class Asker(Protocol):
 
     def shapes(self, X: np.ndarray) -> np.ndarray:
         """Return the field (N, nodes, components) for each row of X (N, 3 + p)."""
+        ...
+
+
+class Releaser(Asker, Protocol):
+    """An export that also says where a body lies after a touch."""
+
+    def release(self, x: np.ndarray, seconds: float) -> np.ndarray:
+        """Return where (3,) the body lies, m, once it is let go for so long after `walk` at x (3 + p,)."""
         ...
 
 
@@ -137,7 +149,7 @@ class Precision:
 
 def places(surrogate: Surrogate, count: int = 1000, seed: int = 0) -> np.ndarray:
     """Return places and parameters (N, 3 + p): inside, on the border, outside, at first contact, some not-a-number."""
-    energy, rng = surrogate.energy, np.random.default_rng(seed)
+    energy, rng = surrogate.hand_energy, np.random.default_rng(seed)
     low, high = bounds(energy.inputs)
     span, D, k = high - low, energy.baseline.directions, len(energy.baseline.directions)
     inner = rng.uniform(low, high, (count * 45 // 100, len(low)))
@@ -197,7 +209,7 @@ def compare_body(
     posterior did. `partial` leaves out columns that the export answers by not-a-number throughout.
     """
     precision = precision or Precision()
-    energy, X = surrogate.energy, places(surrogate)
+    energy, X = surrogate.hand_energy, places(surrogate)
     wanted, got = true_answers(energy, X), asker.answers(X).copy()
     k = len(energy.baseline.directions)
     known = np.where(np.isfinite(X), X, 0.0)
@@ -349,7 +361,7 @@ def _flags(
 
 def _stroke(surrogate: Surrogate, asker: Asker, precision: Precision) -> dict[str, Difference]:
     """Compare along a stroke in and out and sideways, at uneven times."""
-    energy, memory = surrogate.energy, surrogate.memory
+    energy, memory = surrogate.hand_energy, surrogate.memory
     assert memory is not None
     low, high = bounds(energy.inputs)
     D, k = energy.baseline.directions, len(energy.baseline.directions)
@@ -374,6 +386,30 @@ def _stroke(surrogate: Surrogate, asker: Asker, precision: Precision) -> dict[st
     }
 
 
+def compare_rest(surrogate: Surrogate, export: Releaser) -> Difference:
+    """Return how far the places are from palpate where a body lies that was led about and let go."""
+    energy, memory, rng = surrogate.energy, surrogate.memory, np.random.default_rng(3)
+    assert memory is not None
+    low, high = bounds(energy.inputs)
+    D = energy.baseline.directions
+    wanted, got = np.empty((_HISTORIES, 3)), np.empty((_HISTORIES, 3))
+    for i, pause in enumerate(rng.uniform(0.0, 1.0, _HISTORIES)):
+        U = rng.uniform(low, high, (_PLACES, len(low)))
+        U[:, 1:] = U[-1, 1:]
+        X, steps = np.hstack([U[:, :1] @ D, U[:, 1:]]), rng.uniform(0.0, 0.2, _PLACES)
+        evaluate, state = energy.evaluator(), memory.start()
+        moved = MovingRest(evaluate, state, D[0])
+        for x, step in zip(X, steps, strict=True):
+            evaluate(x[:3], x[3:])
+            state.step(x[:3].copy(), evaluate.amplitude, evaluate.slope, float(step))
+        moved.lies[:] = X[-1, :3]
+        moved.release(float(pause), X[-1, 3:])
+        wanted[i] = moved.lies
+        export.walk(np.ascontiguousarray(np.hstack([steps[:, None], X])))
+        got[i] = export.release(X[-1], float(pause))
+    return _difference(wanted, got, np.full(_HISTORIES, _LOOSEST / 10.0))
+
+
 def compare_field(
     surrogate: Surrogate, shown: FieldSurrogate, asker: Asker, precision: Precision | None = None
 ) -> Difference:
@@ -382,7 +418,7 @@ def compare_field(
     The asker answers `shapes` of the field `shown`. Its modes were rounded: it may be off by 1e-4 of its largest value.
     """
     X = np.vstack([places(surrogate)[:_TOUCHES], deepest_touches(surrogate, shown)])
-    X = X[(true_answers(surrogate.energy, X)[:, 20].astype(int) & TOO_DEEP) == 0]
+    X = X[(true_answers(surrogate.hand_energy, X)[:, 20].astype(int) & TOO_DEEP) == 0]
     wanted, got = shown.values(X), asker.shapes(X)
     limit = np.full(len(X), PROMISE if precision is None or not precision.single else 1e-3)
     return _difference(wanted.reshape(len(X), -1), got.reshape(len(X), -1), limit)

@@ -56,10 +56,11 @@ class Touch:
     curvature: Value  # σ''
 
 
-def add_body(graph: Graph, energy: LearntEnergy) -> None:
+def add_body(graph: Graph, energy: LearntEnergy, *, apart: bool = False) -> None:
     """Add the input ``x`` (N, n), and the outputs `BODY_OUTPUTS` of an energy, to a graph.
 
-    ``deviation`` is left out where the body has no posterior.
+    ``deviation`` is left out where the body has no posterior. Where one output is no number, all are not; kept `apart`,
+    each speaks for itself, so that it can be computed without the others.
     """
     baseline, net = energy.baseline, energy.network
     n, D = len(energy.inputs), energy.baseline.directions
@@ -91,7 +92,7 @@ def add_body(graph: Graph, energy: LearntEnergy) -> None:
     if touch is not None and math.isfinite(energy.going.deepest):
         slopes = _leave(graph, baseline, touch, slopes, place)
     graph.stage = "answers"
-    _answers(graph, energy, known, touch, slopes, (given, X, place), finite)
+    _answers(graph, energy, known, touch, slopes, (X, place), finite, apart)
 
 
 def _finite(graph: Graph, X: Value) -> Value:
@@ -322,14 +323,15 @@ def _answers(
     known: BaselineForm,
     touch: Touch | None,
     slopes: Slopes,
-    inputs: tuple[Value, Value, Value],
+    inputs: tuple[Value, Value],
     finite: Value,
+    apart: bool,
 ) -> None:
     """Put energy, force, stiffness, depth, trust out; zero without contact.
 
     Where an input is not finite, or so large that an answer is not, nothing pushes, and the rest is not-a-number.
     """
-    _, X, place = inputs
+    X, place = inputs
     kappa = graph.exp(slopes.value)
     value = kappa * known.energy
     b, g = known.gradient, slopes.gradient
@@ -355,14 +357,18 @@ def _answers(
         for name, out in outputs.items():
             outputs[name] = graph.where(deep if name == "stiffness" else flat, out, 0.0)
         inside = inside | ~touch.contact
-    whole = outputs["energy"] + outputs["force"].sum(1) + outputs["stiffness"].sum(1, 2).rows_as(1)
-    finite = finite & _finite(graph, whole + depth)  # no number may be larger than any
+    outputs["depth"] = depth
+    if not apart:
+        whole = outputs["energy"] + outputs["force"].sum(1) + outputs["stiffness"].sum(1, 2).rows_as(1)
+        finite = finite & _finite(graph, whole + depth)  # no number may be larger than any
     shapes = {"stiffness": (3, 3), "force": (3,), "slope": (3,)}
-    for name, out in (outputs | {"depth": depth}).items():
-        shown = finite.spread(2) if name == "stiffness" else finite
+    for name, out in outputs.items():
+        total = out.sum(1, 2).rows_as(1) if name == "stiffness" else out
+        number = finite & _finite(graph, total) if apart else finite
         # what is not a number must not push anybody
         otherwise = 0.0 if name in {"force", "stiffness"} else math.nan
-        graph.output(name, graph.where(shown, out, otherwise), shapes.get(name, (1,)))
+        number = number.spread(2) if name == "stiffness" else number
+        graph.output(name, graph.where(number, out, otherwise), shapes.get(name, (1,)))
     graph.output("inside", inside & finite, (1,), np.bool_)
 
 

@@ -7,13 +7,13 @@ being the free number of rows; nothing else of a shape is known here.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate.errors import UsageError
 
-__all__ = ["OPSET", "Graph", "Value", "require_onnx"]
+__all__ = ["OPSET", "Graph", "Node", "Value", "require_onnx"]
 
 OPSET, IR = 13, 8  # versions of the operators and of the format of ONNX
 
@@ -29,6 +29,16 @@ def require_onnx() -> Any:
             fix="Run: pip install 'palpate[onnx]'",
         ) from None
     return onnx
+
+
+class Node(NamedTuple):
+    """One operator of a graph: its kind, the names of what it takes and makes, its attributes, and its own name."""
+
+    kind: str
+    operands: tuple[str, ...]
+    result: str
+    attributes: Mapping[str, Any]
+    name: str
 
 
 def _operator(name: str, *, turned: bool = False) -> Callable[[Value, Any], Value]:
@@ -96,30 +106,23 @@ class Graph:
     """
 
     def __init__(self, dtype: type[np.floating]) -> None:
-        self.onnx = require_onnx()
         self.dtype = dtype
         self.stage = "inputs"
-        self._nodes: list[Any] = []
-        self._constants: dict[tuple[Any, ...], str] = {}
-        self._tensors: list[Any] = []
-        self._inputs: list[Any] = []
-        self._outputs: list[Any] = []
+        self.nodes: list[Node] = []
+        self.constants: dict[str, np.ndarray] = {}
+        self._names: dict[tuple[Any, ...], str] = {}
+        self._inputs: list[tuple[str, Any, Sequence[int | None]]] = []
+        self._outputs: list[tuple[str, Any, Sequence[int | None]]] = []
 
     def input(self, name: str, columns: int) -> Value:
         """Return an input (N, columns) of the graph."""
-        self._inputs.append(self._info(name, self.dtype, [None, columns]))
+        self._inputs.append((name, self.dtype, [None, columns]))
         return Value(self, name)
 
     def output(self, name: str, value: Value, shape: Sequence[int], kind: Any = None) -> None:
         """Name a value as an output (N, *shape) of the graph."""
-        self._nodes.append(
-            self.onnx.helper.make_node("Identity", [value.name], [name], name=f"outputs/{name}")
-        )
-        self._outputs.append(self._info(name, kind or self.dtype, [None, *shape]))
-
-    def _info(self, name: str, dtype: Any, shape: list[int | None]) -> Any:
-        kind = self.onnx.helper.np_dtype_to_tensor_dtype(np.dtype(dtype))
-        return self.onnx.helper.make_tensor_value_info(name, kind, ["N", *shape[1:]])
+        self.nodes.append(Node("Identity", (value.name,), name, {}, f"outputs/{name}"))
+        self._outputs.append((name, kind or self.dtype, [None, *shape]))
 
     def integers(self, values: Sequence[int]) -> Value:
         """Return a constant of whole numbers (n,)."""
@@ -135,18 +138,16 @@ class Graph:
 
     def _constant(self, values: np.ndarray) -> Value:
         key = (values.dtype.str, values.shape, values.tobytes())
-        if key not in self._constants:
-            name = f"c{len(self._constants)}"
-            self._constants[key] = name
-            self._tensors.append(self.onnx.numpy_helper.from_array(np.ascontiguousarray(values), name))
-        return Value(self, self._constants[key])
+        if key not in self._names:
+            self._names[key] = f"c{len(self._names)}"
+            self.constants[self._names[key]] = np.ascontiguousarray(values)
+        return Value(self, self._names[key])
 
     def op(self, kind: str, *operands: Any, **attributes: Any) -> Value:
         """Return what an operator makes of values, numbers and arrays."""
-        names = [(v if isinstance(v, Value) else self.constant(v)).name for v in operands]
-        name = f"v{len(self._nodes)}"
-        node = f"{self.stage}/{kind}_{len(self._nodes)}"
-        self._nodes.append(self.onnx.helper.make_node(kind, names, [name], name=node, **attributes))
+        names = tuple((v if isinstance(v, Value) else self.constant(v)).name for v in operands)
+        name, own = f"v{len(self.nodes)}", f"{self.stage}/{kind}_{len(self.nodes)}"
+        self.nodes.append(Node(kind, names, name, attributes, own))
         return Value(self, name)
 
     def exp(self, value: Value) -> Value:
@@ -179,19 +180,44 @@ class Graph:
 
     def whole(self, value: Value) -> Value:
         """Return a value cut to a whole number of int64."""
-        return self.op("Cast", value, to=self.onnx.TensorProto.INT64)
+        return self.op("Cast", value, to=np.int64)
 
     def real(self, value: Value) -> Value:
         """Return whole numbers or truth values as numbers of the graph's precision."""
-        return self.op("Cast", value, to=self.onnx.helper.np_dtype_to_tensor_dtype(np.dtype(self.dtype)))
+        return self.op("Cast", value, to=self.dtype)
 
     def model(self, name: str, metadata: Mapping[str, str]) -> Any:
         """Return the model (a `ModelProto`), checked with its shapes."""
-        helper = self.onnx.helper
-        graph = helper.make_graph(self._nodes, name, self._inputs, self._outputs, self._tensors)
+        onnx = require_onnx()
+        helper = onnx.helper
+
+        def code(dtype: Any) -> int:
+            return int(helper.np_dtype_to_tensor_dtype(np.dtype(dtype)))
+
+        nodes = [
+            helper.make_node(
+                n.kind,
+                list(n.operands),
+                [n.result],
+                name=n.name,
+                **{k: code(v) if k == "to" else v for k, v in n.attributes.items()},
+            )
+            for n in self.nodes
+        ]
+        ends = [
+            [
+                helper.make_tensor_value_info(key, code(dtype), ["N", *shape[1:]])
+                for key, dtype, shape in group
+            ]
+            for group in (self._inputs, self._outputs)
+        ]
+        tensors = [onnx.numpy_helper.from_array(values, key) for key, values in self.constants.items()]
         model = helper.make_model(
-            graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR, producer_name="palpate"
+            helper.make_graph(nodes, name, *ends, tensors),
+            opset_imports=[helper.make_opsetid("", OPSET)],
+            ir_version=IR,
+            producer_name="palpate",
         )
         helper.set_model_props(model, dict(metadata))
-        self.onnx.checker.check_model(model, full_check=True)
+        onnx.checker.check_model(model, full_check=True)
         return model

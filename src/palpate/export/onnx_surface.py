@@ -94,9 +94,7 @@ def _tile_lookup(graph: Graph, table: np.ndarray) -> Lookup:
             within = (along - which * side).rows_as(*shape)
             tile = tile * graph.integers([count]) + which.rows_as(*shape)
             node = node * side + within
-        begin = graph.op(
-            "Cast", graph.op("Gather", graph.table(places), tile, axis=0), to=graph.onnx.TensorProto.INT64
-        )
+        begin = graph.whole(graph.op("Gather", graph.table(places), tile, axis=0))
         node = (begin * graph.integers([SIDE**3]) + node).rows_as(SIDE**3)
         if multiples is None:
             return graph.op("Gather", kept.ravel(), node, axis=0)

@@ -133,6 +133,12 @@ class WasmCore:
             row[3:] = self._read(self._call("state"), 2)
         return out
 
+    def release(self, x: np.ndarray, seconds: float) -> np.ndarray:
+        """Return where (3,) the body lies, m, once it is let go for so long after `walk` at x (3 + p,)."""
+        self._ask(x)
+        self._call("release", seconds)
+        return self._read(self._call("asked"), 3).copy()
+
     def shapes(self, X: np.ndarray) -> np.ndarray:
         """Return the field (N, nodes, components) for each row of X (N, 3 + p), summed up as the page does."""
         field = self._fields[self._shown]

@@ -154,7 +154,7 @@ class WeightsBlock:
         """
         from palpate.export.field_tables import field_tables
 
-        energy, memory = surrogate.energy, surrogate.memory
+        energy, memory = surrogate.hand_energy, surrogate.memory
         baseline, source = energy.baseline, energy.baseline.c_source()
         if source is None:
             raise _refused("baseline", baseline.name)

@@ -5,7 +5,6 @@ It stands above sweeps, which solve, and learning, which learns; neither knows t
 improve            `palpate.improve`: solve, learn and judge in turn, until a force error is kept
 choice_rules       how the next solves are chosen: by variance, distance or disagreement
 force_model        what a Gaussian process on ln(U/U₀) expects of the force, and how its errors become errors of it
-gradient_process   a Gaussian process of a scalar that is observed with its gradient
 kept_solves        solves that are added batch by batch, through interruptions
 stop_rule          when to stop
 """

@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.improvement.force_model import ForceModel
-from palpate.improvement.gradient_process import GradientProcess
+from palpate.learning.gradient_process import GradientProcess
 from palpate.rbf.symmetric_units import Images
 
 __all__ = [

@@ -15,14 +15,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.improvement.gradient_process import (
+from palpate.learning.energy.energy_images import images_of
+from palpate.learning.energy.energy_samples import EnergySamples
+from palpate.learning.energy.suspect_solves import observations
+from palpate.learning.gradient_process import (
     GradientProcess,
-    Observations,
     fit_process,
     no_symmetry,
 )
-from palpate.learning.energy.energy_images import images_of
-from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.rbf.symmetric_units import Images
 from palpate.surrogates import Baseline, Solves
 from palpate.units import Range, bounds
@@ -56,7 +56,7 @@ class ForceModel:
         images = images_of(solves, baseline) or no_symmetry(len(samples.inputs))
         own = baseline if begin is None else begin.baseline
         process = fit_process(
-            _observations(samples, own), images, None if begin is None else begin.process, seed=seed
+            observations(samples, own), images, None if begin is None else begin.process, seed=seed
         )
         own, process = _likeliest(samples, own, process, baseline)
         largest = float(np.linalg.norm(samples.force[:, : samples.felt], axis=1).max())
@@ -123,12 +123,6 @@ class ForceModel:
         return np.asarray(self.baseline.row_weights(X)[:, None] * np.hstack([np.ones((len(X), 1)), known]))
 
 
-def _observations(samples: EnergySamples, baseline: Baseline) -> Observations:
-    rows = samples.rows(baseline)
-    weights = np.hstack([np.ones((len(samples), 1)), rows["slope_weight"]]) * rows["weights"][:, None]
-    return Observations(samples.scaled, np.hstack([rows["Y"], rows["slopes"][:, 0]]), weights)
-
-
 def _likeliest(
     samples: EnergySamples, own: Baseline, process: GradientProcess, kind: Baseline
 ) -> tuple[Baseline, GradientProcess]:
@@ -138,7 +132,7 @@ def _likeliest(
     """
     best, chosen = own, process
     for other in kind.candidates():
-        rival = replace(process, seen=_observations(samples, other))
+        rival = replace(process, seen=observations(samples, other))
         if rival.misfit < chosen.misfit:
             best, chosen = other, rival
     return best, chosen

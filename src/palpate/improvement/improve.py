@@ -97,6 +97,8 @@ class ImprovementStep:
         Why the improvement has ended; empty before.
     model_path : Path or None
         File of the surrogate, where there is one.
+    mesh : float
+        The mesh's part in the relative force error, beside `error`; not-a-number where no finer mesh was solved.
     """
 
     phase: str
@@ -115,6 +117,7 @@ class ImprovementStep:
     reached: bool = False
     reason: str = ""
     model_path: Path | None = None
+    mesh: float = math.nan
     before: float = math.nan
     tried: float = math.nan
 
@@ -379,7 +382,7 @@ class _Improvement:
         self.pressed = self._pressed(train)
         self.values = np.full(len(train), np.nan)
         errors = getattr(getattr(result[1], "energy", None), "errors", None)
-        touching = np.flatnonzero(result[0].energy.baseline.coordinate(train.X) > 0)
+        touching = np.flatnonzero(result[0].hand_energy.baseline.coordinate(train.X) > 0)
         if errors is not None and len(errors) == len(touching):
             self.values[touching] = errors
 

@@ -9,6 +9,7 @@ stream       learning while it runs: a learner, samples retained, bounded refine
 bent_body    a dataset of loads and deflections made into a body that a hand holds at one node
 energy       the energy of a body from solved energies, forces and stiffnesses
 pressed_solves, pad_solves   what a dataset knows of a body that a probe presses, or a pad holds
+gradient_process   a Gaussian process of a scalar that is observed with its gradient
 pad_fit      the baseline of a body that is held by a pad
 fields       how it deforms: modes that travel with the touch
 plastic      a body that stays bent, and how it got there
@@ -20,7 +21,7 @@ learn_dataset  `palpate.learn`: a dataset made into a body that is felt and seen
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.bent_body import FEWEST, hand_coordinates, node_outputs
-from palpate.learning.energy import EnergyHistory, learn_energy
+from palpate.learning.energy import EnergyHistory, SuspectSolve, learn_energy
 from palpate.learning.learn import Learned, automatic, freeze, learn
 from palpate.learning.learn_dataset import LearningHistory
 from palpate.learning.learn_dataset import learn as learn_dataset
@@ -59,6 +60,7 @@ __all__ = [
     "Reservoir",
     "Settings",
     "State",
+    "SuspectSolve",
     "Trial",
     "automatic",
     "default",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,16 @@ from palpate.dataset.carried_surface import (
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
-from palpate.learning.fields import Snapshots, lumped_mass
+from palpate.learning.fields import LearntField, Snapshots, learn_snapshots, lumped_mass
 from palpate.learning.kept_surface import touched_overlap, touched_surface
-from palpate.surrogates import Baseline, ContactBaseline, ContactLaw, Solves, TouchedSurface
+from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_region
+from palpate.learning.recognised import Recognised, Request, recogniser
+from palpate.options import FieldOptions
+from palpate.surrogates import Baseline, ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
 from palpate.surrogates.baselines import OverlapBaseline, depth_series
 from palpate.units import Range
 
-__all__ = ["FEWEST", "PressedSolves", "is_pressed"]
+__all__ = ["FEWEST", "PressedSolves", "is_pressed", "recognise_pressed"]
 
 FEWEST = 6  # solves in contact: what the law and an affine network have to be found from, and judged by
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # what "side" of a box means
@@ -52,6 +56,40 @@ def _probe(data: Dataset) -> Mapping[str, Any] | None:
     return probes[0] if len(probes) == len(acting) == 1 else None
 
 
+@recogniser
+def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
+    """Return the body of solves under one probe; None of any other dataset."""
+    if not is_pressed(data):
+        return None
+    pressed = PressedSolves.of(data, request.layout)
+
+    def learn_field(field: FieldOptions) -> LearntField:
+        return learn_snapshots(
+            pressed.snapshots(field.name, seed=request.search.seed),
+            inputs=pressed.inputs,
+            points=pressed.points,
+            triangles=pressed.triangles,
+            mass=lumped_mass(pressed.points, pressed.triangles),
+            surface=pressed.surface,
+            radius=pressed.radius,
+            radius_input=pressed.radius_input,
+            options=field,
+            drawn=pressed.drawn,
+        )
+
+    own, options = request.split("law", "length", "deviation")
+    baseline, law, length = pressed.baseline, own.get("law", "auto"), own.get("length")
+    if isinstance(law, ContactLaw):
+        baseline, options["choose"] = replace(baseline, law=law), False
+    elif length is not None:
+        baseline = replace(baseline, law=ContactLaw("series", length))
+    region = partial(pressed.painted_region, deviation=own.get("deviation"))
+    deepest = {"deepest": pressed.deepest or None}
+    # a law that was asked for is taken as it is
+    rivals = None if options.get("choose") is False else pressed.overlap_baselines
+    return Recognised(baseline, pressed.solves, deepest | options, learn_field, rivals=rivals, region=region)
+
+
 @dataclass(frozen=True, eq=False)
 class PressedSolves:
     """Solves of a body under a probe, and what is known of them."""
@@ -70,6 +108,9 @@ class PressedSolves:
     resolved: float | None
     deepest: float  # depth that the solves were made to, m; 0 where the provenance does not tell
     skin: tuple[np.ndarray, np.ndarray]  # points (P, 3) in m and triangles (t, 3) of which `surface` is made
+    # corners (t, 3, 3) of the triangles of the surface that was to be pressed all over, and of all others, m; None
+    # where the presses keep a margin
+    painted: tuple[np.ndarray, np.ndarray] | None = None
     drawn: CarriedSurface | None = (
         None  # the body's own surface, of a file; its triangles are then in four parts
     )
@@ -88,7 +129,8 @@ class PressedSolves:
                 f"{count(len(data), 'converged solve')}: too few to learn a touched body from.",
                 fix=f"Sweep at least {FEWEST}, better 40 or more.",
             )
-        rest, triangles, touched = _surface(data, layout, str(probe["touches"]))
+        rim = probe.get("rim")
+        rest, triangles, touched, met = _surface(data, layout, str(probe["touches"]), rim)
         points, own = surface_nodes(rest, triangles, has_middles(data))
         drawn = None
         if has_middles(data):
@@ -107,7 +149,7 @@ class PressedSolves:
             touched_surface(
                 data,
                 rest,
-                touched,
+                triangles[met],
                 radius=largest,
                 inner=_inner(_deepest(probe), largest),
                 shoulder=SHOULDER * radius,
@@ -118,7 +160,8 @@ class PressedSolves:
             about,
             None if element is None else float(element) ** 2 / (2 * radius),
             _deepest(probe),
-            (rest, touched),
+            (rest, triangles[met]),
+            None if rim is None else (rest[triangles[touched]], rest[triangles[~touched]]),
             drawn,
         )
 
@@ -150,6 +193,22 @@ class PressedSolves:
     def depth_series(self) -> np.ndarray:
         """Number (N,) of each solve's depth series, whatever its further inputs are."""
         return depth_series(self.data.X[:, :3], self.surface, self.radius)
+
+    def painted_region(self, energy: LearntEnergy, deviation: float | None) -> PaintedRegion | None:
+        """Return the trained region of an energy of these solves by what was painted, None where nothing says that.
+
+        `deviation` is the largest relative deviation of the force that counts as trained, by default 7 %. A region of
+        mirror images, or of further inputs than the place, is that around the solves.
+        """
+        if self.painted is None or len(self.matrices) > 1 or len(self.inputs) > 3 or energy.root is None:
+            return None
+        return painted_region(
+            energy,
+            *self.painted,
+            radius=self.radius,
+            deepest=self.deepest,
+            deviation=deviation or DEVIATION,
+        )
 
     def snapshots(self, name: str, *, seed: int = 0, most: int = MOST) -> list[Snapshots]:
         """Return a field of all solves as they are and at their mirror images, each on its own nodes.
@@ -223,8 +282,10 @@ def _checked_probe(data: Dataset) -> Mapping[str, Any]:
     return probe
 
 
-def _surface(data: Dataset, layout: Layout | None, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes, all triangles, and those of the touched surface."""
+def _surface(
+    data: Dataset, layout: Layout | None, touches: str, rim: str | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the nodes, all triangles (t, 3), and which of these are touched and which the probe meets at all."""
     if layout is None:
         rest, triangles = data.rest, data.triangles
         surfaces, of = data["surface"].tolist(), data["surface_of"]
@@ -233,13 +294,18 @@ def _surface(data: Dataset, layout: Layout | None, name: str) -> tuple[np.ndarra
         assert layout.surface_of is not None
         rest, triangles, of = layout.rest, layout.triangles, layout.surface_of
         surfaces = list(layout.surfaces)
-    names = (name,) if name in surfaces else UPRIGHT if name == "side" else ()
-    touched = np.isin(of, [i for i, one in enumerate(surfaces) if one in names])
-    if not touched.any():
-        raise UsageError(
-            f"The mesh has no surface called {name!r}.", why=f"It has {', '.join(map(str, surfaces))}."
-        )
-    return rest, triangles, triangles[touched]
+
+    def on(name: str) -> np.ndarray:
+        names = (name,) if name in surfaces else UPRIGHT if name == "side" else ()
+        mine = np.isin(of, [i for i, one in enumerate(surfaces) if one in names])
+        if not mine.any():
+            raise UsageError(
+                f"The mesh has no surface called {name!r}.", why=f"It has {', '.join(map(str, surfaces))}."
+            )
+        return np.asarray(mine)
+
+    touched = on(touches)
+    return rest, triangles, touched, touched if rim is None else touched | on(rim)
 
 
 def _drawn(series: np.ndarray, images: int, most: int, seed: int) -> list[np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,6 +14,7 @@ from palpate.files import restore_folder
 from palpate.improvement import ImprovementStep, improve
 from palpate.improvement.improve import Interest
 from palpate.options import ImprovementOptions, takes
+from palpate.study.mesh_check import load_finer, mesh_part, solve_finer
 from palpate.study.run import (
     Log,
     Outcome,
@@ -27,6 +29,7 @@ from palpate.study.run import (
 from palpate.study.stage_records import ProbeSweepRecord
 from palpate.study.study import Study
 from palpate.study.study_advice import earlier_curve
+from palpate.sweeps import local_cluster
 
 __all__ = ["conclude", "improve_study"]
 
@@ -46,7 +49,8 @@ def improve_study(
 
     A later call goes on where this one stopped, from whatever solves the study has. The surrogate of each step stays as
     ``NAME-SOLVES.palpate``, and the newest as ``NAME.palpate``; a step tells its file as `model_path`. All solves that
-    ``[test]`` asks for have judged the surrogate by the time its error counts as reached.
+    ``[test]`` asks for have judged the surrogate by the time its error counts as reached. Some of these are solved on
+    finer elements too, once a first surrogate is judged: each step then tells the mesh's part in the error.
 
     Seed and workers are those of the study. `interest` takes inputs (C, n) of places and returns how much an error
     there counts, (C,), such as where a hand goes. `progress` is of each batch.
@@ -62,21 +66,31 @@ def improve_study(
     assert wanted is not None  # a probe's test is never empty
     restore_folder(paths.data)
     finished = Dataset.open(paths.data).ok if paths.data.exists() else None
-    steps = improve(
-        problem,
-        options=replace(options, seed=study.sweep.seed, workers=study.sweep.workers),
-        unseen=wanted["points"],
-        path=paths.data,
-        unseen_path=paths.random,
-        learner=lambda data, effort: learn_study(_with_effort(study, effort), data, log=log),
-        known=_known(paths, finished),
-        cluster=cluster if cluster is not None else study.sweep.scheduler,
-        interest=interest,
-        progress=progress,
-        log=log,
-    )
-    for step in steps:
-        yield replace(step, model_path=_keep(study, paths, step))
+    with contextlib.ExitStack() as stack:
+        if cluster is None:
+            cluster = study.sweep.scheduler or stack.enter_context(local_cluster(study.sweep.workers))
+        steps = improve(
+            problem,
+            options=replace(options, seed=study.sweep.seed, workers=study.sweep.workers),
+            unseen=wanted["points"],
+            path=paths.data,
+            unseen_path=paths.random,
+            learner=lambda data, effort: learn_study(_with_effort(study, effort), data, log=log),
+            known=_known(paths, finished),
+            cluster=cluster,
+            interest=interest,
+            progress=progress,
+            log=log,
+        )
+        finer, is_asked = load_finer(study, paths), False
+        for step in steps:
+            # two or three touches that tell of the mesh: as soon as there are others to compare with, and time
+            if step.phase == "judged" and not is_asked and step.seconds < options.limit:
+                is_asked = True
+                solving = {"cluster": cluster, "progress": progress is True, "log": log}
+                finer = solve_finer(study, paths, step.test, case_limit=options.case_limit, **solving)
+            part = mesh_part(step.test, finer)
+            yield replace(step, model_path=_keep(study, paths, step), mesh=part)
 
 
 def conclude(study: Study, paths: Paths, step: ImprovementStep) -> Outcome:
@@ -84,7 +98,7 @@ def conclude(study: Study, paths: Paths, step: ImprovementStep) -> Outcome:
     if step.surrogate is None or step.train is None or step.test is None:
         raise UsageError("This step has no solves yet.", fix="Conclude with the last step.")
     train, test = split_rows(study, step.train, step.test)
-    validation = validate_study(study, step.surrogate, test, step.history)
+    validation = validate_study(study, step.surrogate, test, step.history, load_finer(study, paths))
     surrogate = step.surrogate
     origin = surrogate.meta.get("dataset", {})
     if step.phase != "solved" and isinstance(train, Dataset) and origin.get("hash") != train.hash:

@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeAlias
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from palpate.physics import GluedPad, PointLoad, SphereProbe
+from palpate.physics.interactions.sphere import RIGID
 from palpate.physics.shapes.naming import members
 from palpate.physics.solid.body_family import BESIDE, UNITS
 from palpate.physics.solid.body_symmetry import fundamental_part
@@ -92,8 +93,12 @@ class ProbeRecord(_OnSurface):
 
     kind: Literal["probe"] = "probe"
     radius: Metres = Field(0.010, gt=0, description="of the ball")
-    pad: PadStiffness = Field(2e6, gt=0, description="stiffness of the pad")
-    stop: Metres = Field(0.004, gt=0, description="penetration at which the pad is fully pressed")
+    pad: PadStiffness | Literal["rigid"] = Field(
+        2e6, description='stiffness of the pad; "rigid" for a ball without one that is felt'
+    )
+    stop: Metres = Field(
+        0.004, gt=0, description="penetration at which the pad is fully pressed; a rigid ball has none"
+    )
     depth: Pair = Field((2e-4, 0.012), description="least and largest depth of the ball's tip, m")
     over: tuple[Pair, Pair] | tuple[Triple, Triple] | None = Field(
         None,
@@ -101,6 +106,32 @@ class ProbeRecord(_OnSurface):
         "a margin of 3 radii",
         examples=[((0.03, 0.03), (0.07, 0.07))],
     )
+    rim: str | None = Field(
+        None,
+        description="surface around the touched one that the ball may meet too: with it all of the touched one is "
+        "pressed, without a margin",
+        examples=["rim"],
+    )
+
+    def fault(self, body: BodyRecord) -> str:
+        """Return what does not fit between the ball and the body; empty if all fits."""
+        if (fault := super().fault(body)) or self.rim is None:
+            return fault
+        known = body.surface_names()
+        if not members(self.rim, known):
+            return f"a {body.kind} has no surface {self.rim!r} to be the rim; it has {', '.join(known)}"
+        return f"the rim {self.rim!r} is held" if self.rim in body.fixed_names() else ""
+
+    @field_validator("pad", mode="before")
+    @classmethod
+    def _stiffness_or_rigid(cls, pad: Any) -> Any:
+        """Return the word of a rigid ball, or a positive stiffness in N/m³."""
+        if isinstance(pad, str) and pad.strip().lower() == RIGID:
+            return RIGID
+        stiffness = in_si(pad, "N/m^3")
+        if not stiffness > 0:
+            raise ValueError(f'{stiffness:g} is no stiffness of a pad: give one above 0, or "rigid"')
+        return stiffness
 
     @model_validator(mode="after")
     def _in_order(self) -> ProbeRecord:
@@ -115,7 +146,13 @@ class ProbeRecord(_OnSurface):
     def build(self, body: Any, *, whole: bool = True) -> SphereProbe:
         """Return the probe: over all that it shall touch, or over the part that symmetry leaves to be solved."""
         probe = SphereProbe(
-            self.radius, touches=self.touches, pad=self.pad, stop=self.stop, depth=self.depth, over=self.over
+            self.radius,
+            touches=self.touches,
+            pad=self.pad,
+            stop=self.stop,
+            depth=self.depth,
+            over=self.over,
+            rim=self.rim,
         )
         return probe if whole else fundamental_part(body, probe)
 

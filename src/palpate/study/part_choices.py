@@ -22,6 +22,7 @@ from palpate.record_complaints import complaints
 from palpate.study.interaction_records import ProbeRecord
 from palpate.study.material_records import SolidMaterialRecord
 from palpate.study.part_records import PartRecord
+from palpate.study.part_rim import with_rim
 from palpate.study.part_study import COARSE, HELD, TOUCHED
 from palpate.study.study import Study
 
@@ -91,7 +92,7 @@ def chosen_study(study: Study, choices: PartChoices) -> Study:
         content["sweep"]["element"] = min(content["sweep"]["element"], COARSE * choices.radius)
     content["interaction"] |= {"touches": touches, "radius": choices.radius, "depth": (least, choices.depth)}
     try:
-        return Study.model_validate(content)
+        return with_rim(Study.model_validate(content))
     except ValidationError as error:
         raise UsageError(" ".join(complaints(error, Study)), fix="Change it on the page.") from error
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -52,6 +53,14 @@ class PartSurfaceRecord(Record):
         description="triangles of the surface as it is read, as `palpate touch` writes them; not for CAD files",
         examples=["0-17 25 40-80 of 5120"],
     )
+    around: str = Field(
+        "",
+        description="another surface: what lies around it on the same side, as far as `reach`, and is not held; not "
+        "for CAD files",
+    )
+    reach: Metres | None = Field(
+        None, gt=0, description="how far from the surface `around`", examples=["7 mm"]
+    )
 
     @field_validator("name")
     @classmethod
@@ -83,6 +92,10 @@ class PartSurfaceRecord(Record):
 
     @model_validator(mode="after")
     def _not_empty(self) -> PartSurfaceRecord:
+        if bool(self.around) != (self.reach is not None):
+            raise ValueError(
+                '`around` and `reach` go together, such as around = "touched" and reach = "7 mm"'
+            )
         low, high = self._corners()
         for axis, a, b in zip("xyz", low, high, strict=True):
             if a is not None and b is not None and not a < b:
@@ -93,7 +106,7 @@ class PartSurfaceRecord(Record):
     def is_rest(self) -> bool:
         """True for a surface without bounds: what the others leave."""
         low, high = self._corners()
-        return not (self.faces or self.facing or self.triangles) and not any(
+        return not (self.faces or self.facing or self.triangles or self.around) and not any(
             value is not None for value in (*low, *high)
         )
 
@@ -122,6 +135,8 @@ class PartSurfaceRecord(Record):
             self.within,
             faces,
             self.triangles,
+            self.around,
+            self.reach or 0.0,
         )
 
 
@@ -148,6 +163,12 @@ class PartRecord(Record):
         description=f"surfaces: from which angle on an edge is sharp, degrees; left out: {FEATURE_ANGLE:g}",
         examples=[FEATURE_ANGLE],
     )
+    wrap: Metres | None = Field(
+        None,
+        gt=0,
+        description="surfaces that cut themselves or have holes: a closed one is laid around, so far away at most",
+        examples=["1 mm"],
+    )
     material: SolidMaterial | None = Field(
         None, description="of each region that `materials` doesn't name", examples=["ecoflex 00-30"]
     )
@@ -163,10 +184,16 @@ class PartRecord(Record):
         if sum(surface.is_rest for surface in self.surfaces) > 1:
             raise ValueError("two surfaces have no bounds; one alone can be what the others leave")
         kind = part_kind(self.file)
+        if kind == "cad" and any(surface.around for surface in self.surfaces):
+            raise ValueError(
+                f"{self.file} is a CAD file: its surfaces can't be chosen by what they are around"
+            )
         if self.element is not None and kind == "mesh":
             raise ValueError(f"{self.file} is a mesh and keeps its elements: leave out element")
         if self.feature_angle is not None and kind != "surface":
             raise ValueError("feature_angle is for surfaces, such as STL files")
+        if self.wrap is not None and kind != "surface":
+            raise ValueError("wrap is for surfaces, such as STL files")
         regions = self.shape().regions  # its errors say more than a line of a list
         for region in self.materials:
             if region not in regions:
@@ -194,17 +221,20 @@ class PartRecord(Record):
     def shape(self) -> ImportedSolid | ImportedMesh:
         """Return the shape, with names for parts of its surface."""
         patches = self.patches()
-        return part_shape(self.file, self.unit, self.element, self.feature_angle, patches)
+        return part_shape(self.file, self.unit, self.element, self.feature_angle, patches, self.wrap)
 
     def bare(self) -> ImportedSolid | ImportedMesh:
         """Return the shape with the names of its file alone."""
-        return part_shape(self.file, self.unit, self.element, self.feature_angle)
+        return part_shape(self.file, self.unit, self.element, self.feature_angle, wrap=self.wrap)
 
     def patches(self) -> tuple[SurfacePatch, ...]:
         """Return the names for parts of the surface, in the order in which they are given: later ones go over."""
-        # what the others leave comes first
-        ordered = sorted(self.surfaces, key=lambda surface: not surface.is_rest)
-        return tuple(surface.patch() for surface in ordered)
+        # what the others leave comes first, what is around another one last
+        ordered = sorted(self.surfaces, key=lambda surface: (bool(surface.around), not surface.is_rest))
+        patches = [surface.patch() for surface in ordered]
+        return tuple(
+            replace(patch, spared=self.fixed_names()) if patch.around else patch for patch in patches
+        )
 
     def build(self) -> Body:
         """Return the body."""
@@ -223,14 +253,15 @@ def part_shape(
     element: float | None = None,
     feature_angle: float | None = None,
     patches: tuple[SurfacePatch, ...] = (),
+    wrap: float | None = None,
 ) -> ImportedSolid | ImportedMesh:
     """Return the shape of a part's file: a solid of CAD or a surface, else a volume mesh.
 
     STEP and IGES files state the unit of their numbers, a mesh is in m by default. `element` is the largest element in
     m, of a solid or a surface; `feature_angle` is in degrees, from which on an edge of a surface is sharp. The patches
-    are names for parts of the surface.
+    are names for parts of the surface; `wrap` is the size in m by which a surface is wrapped.
     """
     if part_kind(file) not in ("cad", "surface"):
         return ImportedMesh(file, unit or "m", patches)
     angle = FEATURE_ANGLE if feature_angle is None else feature_angle
-    return ImportedSolid(file, unit, element, patches, angle)
+    return ImportedSolid(file, unit, element, patches, angle, wrap=wrap)

@@ -20,12 +20,15 @@ from palpate.physics.shapes.mesh import BodyMesh, Face
 from palpate.record_complaints import complaints
 from palpate.study.interaction_records import ProbeRecord
 from palpate.study.part_records import PartRecord, part_shape
+from palpate.study.part_rim import with_rim
 from palpate.study.study import Study
 from palpate.study.toml import to_toml
+from palpate.units import parse_quantity
 
-__all__ = ["part_study", "part_text", "study_file", "study_name"]
+__all__ = ["AUTO", "part_study", "part_text", "study_file", "study_name"]
 
 HELD, TOUCHED = "held", "touched"
+AUTO = "auto"  # size of elements that finer solves decide
 YOUNG, POISSON = 10e3, 0.45  # Pa; of soft tissue, until the user says what it is
 SMALL = 5e-3  # m: a part that would be smaller in mm may have been drawn in m
 # length of a plane's mean normal, and share of the height within which it is lowest
@@ -66,7 +69,7 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
             why=f"Its name ends in {part_ending(path) or 'nothing'}.",
             fix=f"Give {PART_FORMATS}. {way_for(path)}".strip(),
         )
-    unit, faces = _read(path, options.unit)
+    unit, faces = _read(path, options.unit, options.wrap)
     low = np.min([face.lower for face in faces], axis=0)
     high = np.max([face.upper for face in faces], axis=0)
     footprint = float(np.prod((high - low)[:2]))
@@ -75,6 +78,8 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
         least = float((high - low).min())
         radius = _nice(min(max(RADIUS * least, math.sqrt(footprint / CELLS) / COARSE), LARGEST * least))
     element = _nice(min(math.sqrt(footprint / CELLS), COARSE * radius))
+    if options.element not in {None, AUTO}:
+        element = parse_quantity(options.element, "m", "--element", bare=False)
     deepest = _nice(DEPTH * radius) if options.depth is None else options.depth
     fixed, named = _support(faces, float(low[2]), float(high[2] - low[2]))
     if options.held:
@@ -85,6 +90,7 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
             "kind": "part",
             "file": str(path),
             "unit": unit,
+            "wrap": options.wrap,
             "material": _material(options),
             "fixed": fixed,
             "surfaces": named,
@@ -102,6 +108,7 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     study = _suit(study, content, element)
     if options.depth is None:
         study = _suit_depth(study)
+    study = with_rim(study)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
 
@@ -198,15 +205,15 @@ def part_text(study: Study, notes: Iterable[str]) -> str:
     return to_toml(study.model_copy(update={"body": body}), notes)
 
 
-def _read(path: Path, unit: str | None) -> tuple[str | None, Sequence[Face]]:
+def _read(path: Path, unit: str | None, wrap: float | None) -> tuple[str | None, Sequence[Face]]:
     """Return the unit, and the faces of the part."""
     if unit is not None or states_unit(path):
-        return unit, part_shape(str(path), unit).faces
+        return unit, part_shape(str(path), unit, wrap=wrap).faces
     try:
-        faces = part_shape(str(path), "mm").faces
+        faces = part_shape(str(path), "mm", wrap=wrap).faces
     except UsageError as error:
         try:
-            return "m", part_shape(str(path), "m").faces
+            return "m", part_shape(str(path), "m", wrap=wrap).faces
         except PalpateError:
             raise error from None
     low = np.min([face.lower for face in faces], axis=0)

@@ -72,14 +72,17 @@ def work_on(
     limit: float,
     workers: int | None = None,
     stopped: Callable[[], bool] = lambda: False,
+    refine: Path | None = None,
 ) -> None:
     """Improve a study until a force error is kept, and say all that a page shows of it.
 
     `say` takes what the module's text lists. `until` is the wanted relative force error at the 95th percentile of
     unseen solves; after `limit` s, or once `stopped` returns true, no further batch of solves begins. `workers` is
-    by default one for each core, one fewer once there is something to touch.
+    by default one for each core, one fewer once there is something to touch. `refine` is the study's file where finer
+    solves are to decide the size of its elements; what is solved already stays.
     """
     from palpate.study.improve_study import improve_study
+    from palpate.study.mesh_check import refine_study
     from palpate.sweeps import local_cluster
 
     began = time.monotonic()
@@ -109,6 +112,10 @@ def work_on(
         return
     fewer = workers or max(1, available_cores() - 1)
     with local_cluster(fewer) as cluster:
+        if refine is not None and not paths.data.exists():
+            study = refine_study(
+                study, refine, cluster=cluster, progress=False, log=lambda w: say({"log": w})
+            )
         steps = improve_study(
             study.with_workers(fewer),
             paths,
@@ -215,8 +222,10 @@ def _figures(step: Any) -> dict[str, Any]:
         "reason",
         "before",
         "tried",
+        "mesh",
     )
-    return {name: getattr(step, name) for name in names} | {"places": step.places.tolist()}
+    painted = {} if step.surrogate is None else step.surrogate.meta.get("painted", {})
+    return {name: getattr(step, name) for name in names} | {"places": step.places.tolist()} | painted
 
 
 def _callbacks(say: Say) -> dict[str, Any]:
@@ -250,6 +259,7 @@ def main() -> int:
             limit=wish["limit"],
             workers=wish["workers"],
             stopped=stopping.is_set,
+            refine=file if wish.get("refine") else None,
         )
     except PalpateError as error:
         say({"failed": {"what": error.what, "why": error.why, "fix": error.fix}})

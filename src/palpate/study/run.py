@@ -28,6 +28,7 @@ from palpate.learning.learn_dataset import filter_record
 from palpate.learning.plastic import LoadHistories
 from palpate.processes import CASE_LIMIT
 from palpate.study.memory_stages import learn_histories, sweep_histories
+from palpate.study.mesh_check import load_finer, solve_finer
 from palpate.study.relaxation_stage import with_relaxation
 from palpate.study.study import Study
 from palpate.study.study_paths import Paths
@@ -135,6 +136,8 @@ def sweep_study(
         unseen = grow(paths.random, problem, further) if paths else None
         if unseen is None:
             unseen = sweep(problem, path=paths.random if paths else None, **further, **common)
+        if paths is not None:
+            solve_finer(study, paths, unseen, log=log, **common)
         return data, unseen
 
 
@@ -212,11 +215,13 @@ def learn_study(
     progress: Callable[[int, int], None] | None = None,
     log: Log = lambda _: None,
     watch: Any = None,
+    leave_out: Sequence[int] = (),
 ) -> tuple[Any, Any]:
     """Learn the study's surrogate, which keeps the study's runtime settings.
 
     Rows of `test` are only watched while a filter learns; `progress` counts its observations, and `watch` (a
-    GrowthRecorder) keeps frames of a sequential filter's growth. Returns what `palpate.learn` returns, and for a
+    GrowthRecorder) keeps frames of a sequential filter's growth. Rows of `train` numbered in `leave_out` are not learnt
+    from. Returns what `palpate.learn` returns, and for a
     body with memory how well it fits.
     """
     if watch is not None and (study.filter is None or not isinstance(train, Dataset)):
@@ -227,8 +232,13 @@ def learn_study(
         )
     if isinstance(train, Dataset):
         options = _options(study, train, test, progress, log) | ({} if watch is None else {"watch": watch})
-        model, history = learn_dataset(train, **options)
+        model, history = learn_dataset(train, leave_out=leave_out, **options)
         model = with_relaxation(study, model, log)
+    elif leave_out:
+        raise UsageError(
+            f"The study {study.name!r} learns from histories, of which none can be left out.",
+            fix="Omit --leave-out.",
+        )
     else:
         model, history = learn_histories(study, train)
     return _with_meta(model, {"runtime": study.runtime.model_dump()}), history
@@ -252,10 +262,15 @@ def _with_meta(model: Any, more: Mapping[str, Any]) -> Any:
     return replace(model, meta={**model.meta, **more})
 
 
-def validate_study(study: Study, model: Any, test: Rows, history: Any = None) -> Validation:
-    """Judge what was learnt by solves that it has never seen, by the study's targets."""
+def validate_study(
+    study: Study, model: Any, test: Rows, history: Any = None, finer: Dataset | None = None
+) -> Validation:
+    """Judge what was learnt by solves that it has never seen, by the study's targets.
+
+    `finer` are some of them on finer elements, which tell the mesh's part in the error.
+    """
     assert study.target is not None  # every kind of study has one
-    return validate(model, test, history=filter_record(history), limits=study.target.limits())
+    return validate(model, test, history=filter_record(history), refined=finer, limits=study.target.limits())
 
 
 def with_validation(
@@ -341,7 +356,8 @@ def carry_out(
     data, further = timed("sweep", lambda: sweep_study(study, paths, **sweeping))
     train, test = split_rows(study, data, further)
     model, history = timed("learn and refine", lambda: learn_study(study, train, test))
-    validation = timed("validate", lambda: validate_study(study, model, test, history))
+    finer = load_finer(study, paths)
+    validation = timed("validate", lambda: validate_study(study, model, test, history, finer))
     model = with_validation(model, validation)
     save_model(paths, model, history)
     others: dict[str, Any] = {}

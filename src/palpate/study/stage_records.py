@@ -141,6 +141,12 @@ class ProbeTestRecord(Record):
     samples: Count = Field(200, ge=1, description="number of solves")
     depths: Count = Field(4, ge=1, description="solves in a depth series")
     seed: Count = Field(7, ge=0, description="decides where the series are")
+    finer: Count = Field(
+        3,
+        ge=0,
+        description="of these, how many are solved again on elements half as large, for the mesh's part in the error; "
+        "0: none, and that part stays unknown",
+    )
 
     def arguments(self, problem: Any) -> dict[str, Any] | None:
         """Return the arguments of `palpate.sweep` that say where to test."""
@@ -248,6 +254,9 @@ class TouchTargetRecord(Record):
     force_median: Number = Field(0.01, ge=0, description="relative force error, median")
     force_p95: Number = Field(0.035, ge=0, description="relative force error, 95th percentile")
     light_force_p95: Number = Field(0.035, ge=0, description="of light touches, over f₀")
+    mesh_force: Number = Field(
+        0.035, ge=0, description="the mesh's part in the force error, by finer elements"
+    )
     stiffness_p95: Number = Field(0.08, ge=0, description="relative stiffness error, 95th percentile")
     direction_p95: Number = Field(5.0, ge=0, description="angle between the forces, degrees")
     displacement_mean: Metres = Field(1e-4, ge=0, description="mean distance of the shown shape's nodes")

@@ -26,6 +26,11 @@ class Paths:
         return self.folder / f"{self.name}-random.zarr"
 
     @property
+    def finer(self) -> Path:
+        """Dataset of a few of these further solves on finer elements, for the mesh's own error."""
+        return self.folder / f"{self.name}-finer.zarr"
+
+    @property
     def histories(self) -> Path:
         """Histories from which a body with memory is learnt."""
         return self.folder / f"{self.name}-histories.palpate"

@@ -37,6 +37,8 @@ _UNITS: dict[str, str] = {
     "pad": "N/m³",
     "within": "°",
     "feature_angle": "°",
+    "painted_area": "m²",
+    "trained_area": "m²",
     "lower": "m",
     "upper": "m",
 }

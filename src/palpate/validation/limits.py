@@ -67,6 +67,8 @@ class Limits:
         Largest second difference of the force along strokes over that of a reference.
     interval_coverage : (float, float)
         Smallest and largest share of the errors that the 90 % interval holds.
+    mesh_force : float
+        The mesh's part in the force error ‖ΔF‖/‖F‖, from the same touches on elements half as large.
     refined_force_median, refined_force_p95 : float
         ‖ΔF‖/‖F‖ against solves on a refined mesh: the model's error and the mesh's together.
     history_force_median, history_force_p95 : float
@@ -74,6 +76,10 @@ class Limits:
         through zero.
     history_energy : float
         Share of the steps of these histories that give lost energy back.
+    answer_p95 : float
+        Error of numbers, fields and curves over the range of each, 95th percentile over solves and places.
+    answer_coverage : (float, float)
+        Smallest and largest share of these errors that the 90 % interval holds, all solves and places together.
 
     Raises
     ------
@@ -96,11 +102,14 @@ class Limits:
     border_loop_work: float | None = 0.01
     smoothness: float | None = 3.0
     interval_coverage: tuple[float, float] | None = (0.80, 0.97)
+    mesh_force: float | None = 0.07
     refined_force_median: float | None = 0.035
     refined_force_p95: float | None = 0.07
     history_force_median: float | None = 0.01
     history_force_p95: float | None = 0.035
     history_energy: float | None = 1e-9
+    answer_p95: float | None = 0.01
+    answer_coverage: tuple[float, float] | None = (0.80, 0.97)
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -198,6 +207,10 @@ _FILTER = (
 )
 _TARGET = "the study's own target"
 _MESH = "Refine the mesh where the probe touches, or sweep more solves: the two errors stand apart below the table."
+_FINER = (
+    "Take smaller elements where the probe touches (`element` in [sweep], or --element auto), and solve anew: more "
+    "solves on the same mesh can't mend it."
+)
 _ROUGH = "palpate's own: at 0.1 m/s and 1 kHz, three times the roughness of the body itself"
 _COVER = "calibration: an interval should hold what it says (Gneiting, Balabdaoui & Raftery 2007)"
 _HISTORIES = "Learn from more histories, or from a finer mesh and smaller steps."
@@ -294,6 +307,7 @@ CRITERIA = (
         "The model is surer of itself than it may be, or less: learn again, or calibrate its deviation by solves "
         "that were left out.",
     ),
+    Criterion("mesh_force", "Force error, the mesh's part", "share", 0.01, _FORCE, _FINER),
     Criterion(
         "refined_force_median", "Force error and mesh error together, median", "share", 0.01, _FORCE, _MESH
     ),
@@ -323,6 +337,22 @@ CRITERIA = (
         0.0,
         "second law of thermodynamics",
         "A stiffness or a time of its elements is negative: learn the body anew.",
+    ),
+    Criterion(
+        "answer_p95",
+        "Numbers and fields, error over their range, 95th percentile",
+        "share",
+        0.005,
+        "palpate's own: a tenth of what the colours of a picture tell apart",
+        "Solve more cases, or cases nearer to the worst one, and learn again.",
+    ),
+    Criterion(
+        "answer_coverage",
+        "Share of these errors within the 90 % interval",
+        "share",
+        (0.85, 0.95),
+        _COVER,
+        "Learn from more solves: of few the widths themselves are uncertain.",
     ),
 )
 """Everything that is judged, in the order in which it is told."""

@@ -12,6 +12,7 @@ from palpate.format import count, criterion_figure
 from palpate.learning import History
 from palpate.learning.learn_dataset import LearningHistory
 from palpate.output_files import json_data
+from palpate.surrogates.model_card import suspect_sentences
 from palpate.validation.figures import FIGURES
 from palpate.validation.figures.figure import Figure
 from palpate.validation.limits import CRITERIA, Check, Limits
@@ -54,7 +55,7 @@ class Validation:
         What was not judged, and why.
     figures : mapping of name to Figure
         ``force``, ``energy``, ``stiffness``, ``smoothness``, ``coverage``, ``loops``, ``border_loops``, ``shape``,
-        ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``: see `palpate.validation.figures`.
+        ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``, ``answers``: see `palpate.validation.figures`.
     """
 
     name: str
@@ -78,6 +79,18 @@ class Validation:
     def failures(self) -> tuple[Check, ...]:
         """Checks that failed."""
         return tuple(c for c in self.checks if not c.passed)
+
+    @property
+    def mesh_part(self) -> float | None:
+        """Part of the mesh in the relative force error, estimated from finer elements; None where it is not known."""
+        return None if self.mesh is None else self.mesh.part
+
+    @property
+    def whole_force_error(self) -> float | None:
+        """Relative force error of surrogate and mesh, the sum of the former at the 95th percentile and the latter."""
+        if self.mesh_part is None or self.force is None or self.force.p95 is None:
+            return None
+        return float(self.force.p95 + self.mesh_part)
 
     @property
     def caution(self) -> str:
@@ -130,11 +143,18 @@ class Validation:
         found: dict[str, Any] = {"unseen solves": self.samples}
         if self.networks is not None:
             found["displacement RMSE / full scale"] = self.networks.refined.relative
+        if self.answers is not None:
+            for one in self.answers:
+                found[f"{one.name}, error over its range, 95th percentile"] = one.p95
+            return {**found, "limits kept": self.passed}
         force = self.histories if self.force is None else self.force
         if self.histories is not None:
             found["unseen histories"] = self.histories.count
         found["force error, median"] = force.median
         found["force error, 95th percentile"] = force.p95
+        if self.whole_force_error is not None:
+            found["force error with the mesh's"] = self.whole_force_error
+            found["force error, the mesh's part"] = self.mesh_part
         found["limits kept"] = self.passed
         return {**found, "caution": self.caution} if self.caution else found
 
@@ -190,7 +210,8 @@ def validate(
         What `palpate.learn` returned beside the model, or the record of a sequential filter alone: its held-out
         error tells whether the filter was stable.
     refined : Dataset or TouchSolves, optional
-        Some of the places solved with half the element size, at least 20: they give the mesh's own error.
+        Some of the places solved with half the element size: three give the mesh's part in the force error, 20 the
+        error of surrogate and mesh together.
     strokes : sequence of TouchSolves, optional
         Solves along strokes, beside which smoothness is judged; by default random strokes beside the model itself.
     limits : Limits, optional
@@ -208,9 +229,11 @@ def validate(
     UsageError
         If the solves are of another body, or of no use as a test.
     """
-    return measure(
+    result = measure(
         Subject.of(model, test, history=history, refined=refined, strokes=strokes, seed=seed), limits
     )
+    suspects = suspect_sentences((getattr(model, "meta", None) or {}).get("suspects", ()))
+    return replace(result, notes=(*result.notes, *suspects))
 
 
 def measure(subject: Subject, limits: Limits | None = None) -> Validation:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 from palpate.format import criterion_figure, share
 from palpate.validation.limits import FORCE_JND
 from palpate.validation.report.summary import felt
 from palpate.validation.validate import Validation
 
-__all__ = ["verdict"]
+__all__ = ["verdict", "whole_error_in_words"]
 
 NAMED = 2  # missed limits that are named; the report has all of them
 
@@ -15,9 +17,18 @@ NAMED = 2  # missed limits that are named; the report has all of them
 def verdict(validation: Validation) -> list[str]:
     """Return the outcome, the error of the force in per cent and in what a hand notices, and the caution if any."""
     error = _force_error(validation)
-    if validation.mesh is not None:  # who gives refined solves asks for it
+    if words := whole_error_in_words(validation.whole_force_error, validation.mesh_part):
+        error += f"; {words}"
+    elif validation.mesh is not None:  # who gives refined solves asks for it
         error += f"; {validation.mesh.lines()[0]}"
     return [_outcome(validation), error, *([f"caution: {validation.caution}"] if validation.caution else [])]
+
+
+def whole_error_in_words(whole: float | None, part: float | None) -> str:
+    """Return the force error of surrogate and mesh, and the mesh's part in it, in words; "" where it is not known."""
+    if whole is None or part is None or math.isnan(part):
+        return ""
+    return f"force ± {share(whole)} in all, of it the mesh {share(part)}"
 
 
 def _outcome(validation: Validation) -> str:
@@ -39,6 +50,9 @@ def _outcome(validation: Validation) -> str:
 def _force_error(validation: Validation) -> str:
     """Return the error of the force on the hand at the median and the 95th percentile, in words too."""
     force, along = validation.force, validation.histories
+    if validation.answers is not None:
+        worst = max(validation.answers, key=lambda one: one.p95)
+        return f"{worst.name} off by at most {share(worst.p95)} of its range for 95 of 100 values"
     if along is not None:
         noticed = felt(along.p95 / FORCE_JND)
         return (

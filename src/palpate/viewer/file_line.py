@@ -1,14 +1,14 @@
 """A body drawn as a line in a page that is one file: what the page knows of it, and how it is compared with palpate.
 
 The network of the nodes goes out as a block of its own. The page asks it by the loads that the answered force says and
-by the further inputs, and lets the line swing back to rest as the server does (`palpate.viewer.page_model`).
+by the further inputs, and lets the line swing back to rest as the server does (`palpate.viewer.page_model`). One that
+lies elsewhere after a touch stays there: the page follows its memory in steps, as the real-time loop does.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from palpate.errors import UsageError
 from palpate.export.check_points import Difference, compare_network
 from palpate.export.wasm_core import WasmCore
 from palpate.runtime.touchable import touchable
@@ -16,24 +16,15 @@ from palpate.surrogates import NodeField, Surrogate
 from palpate.units import bounds
 from palpate.viewer.page_model import DAMPING, FREQUENCY, STILL
 
-__all__ = ["compare_line", "line_facts", "refuse_moving_rest"]
-
-
-def refuse_moving_rest(surrogate: Surrogate) -> None:
-    """Refuse a body that lies elsewhere after a touch: a page that is one file knows no rest that moves."""
-    if touchable(surrogate).stays:
-        raise UsageError(
-            f"The body {surrogate.name!r} can't be a page that is one file.",
-            why="It lies elsewhere after a touch, and only the real-time loop follows where it lies.",
-            fix="Export its force with `palpate export c`, or show it with `palpate view`.",
-        )
+__all__ = ["compare_line", "line_facts"]
 
 
 def line_facts(line: NodeField, surrogate: Surrogate) -> dict[str, Any]:
     """Return what the page must know of a line beside its network, as JSON."""
     low, high = bounds(line.inputs)
     return {
-        "directions": surrogate.energy.baseline.directions.tolist(),
+        "stays": touchable(surrogate).stays,
+        "directions": surrogate.hand_energy.baseline.directions.tolist(),
         "touched": line.touched.tolist(),
         "further": list(line.further),
         "by_place": line.asked_by == "place and load",

@@ -22,7 +22,7 @@ import numpy as np
 
 from palpate.devices import device_traits
 from palpate.export.build_core import built_core
-from palpate.export.check_points import Comparison, ExportedFile, compare_body, compare_field
+from palpate.export.check_points import Comparison, ExportedFile, compare_body, compare_field, compare_rest
 from palpate.export.field_tables import PROMISE, SURFACE, field_tables
 from palpate.export.wasm_core import WasmCore, wasmtime_module
 from palpate.export.weights_block import FIELD, WeightsBlock
@@ -33,7 +33,7 @@ from palpate.runtime.touchable import touchable
 from palpate.surrogates import FieldSurrogate, NodeField, Surrogate
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.viewer.about_record import about_record
-from palpate.viewer.file_line import compare_line, line_facts, refuse_moving_rest
+from palpate.viewer.file_line import compare_line, line_facts
 from palpate.viewer.messages import Hello, Modes
 from palpate.viewer.packed_surface import PackedSurface, rounded_points
 from palpate.viewer.page_model import PageModel
@@ -89,7 +89,7 @@ def export_html(
 
 
 def html_page(surrogate: Surrogate) -> str:
-    """Return a learnt body as one HTML file; one whose rest moves, or with a part without C source, has none."""
+    """Return a learnt body as one HTML file; one with a part without C source has none."""
     return _Page.of(surrogate).text
 
 
@@ -119,7 +119,6 @@ class _Page:
     @classmethod
     def of(cls, surrogate: Surrogate) -> _Page:
         """Return the page of a body with as many of its fields as it has room for."""
-        refuse_moving_rest(surrogate)
         surrogate = _shallow(surrogate)
         model = PageModel(touchable(surrogate))
         traits = device_traits("page")
@@ -199,7 +198,10 @@ class _Page:
         if self.nodes is not None:
             core = WasmCore.of(self.block, network=self.nodes)
             whole = compare_body(self.surrogate, core)
-            return replace(whole, parts={**whole.parts, "line": compare_line(self.surrogate, core)})
+            parts = {**whole.parts, "line": compare_line(self.surrogate, core)}
+            if touchable(self.surrogate).stays:
+                parts["rest"] = compare_rest(self.surrogate, core)
+            return replace(whole, parts=parts)
         rounded, further = (
             [field.rounded for field in self.fields],
             [field.block for field in self.fields[1:]],
@@ -215,7 +217,7 @@ class _Page:
 
 def _shallow(surrogate: Surrogate) -> Surrogate:
     """Return the same body, which lets go of a probe about twice as deep as trained: its surface takes less room."""
-    baseline, deepest = surrogate.energy.baseline, touchable(surrogate).deepest
+    baseline, deepest = surrogate.hand_energy.baseline, touchable(surrogate).deepest
     surface = baseline.surface
     if surface is None:
         return surrogate
@@ -223,7 +225,7 @@ def _shallow(surrogate: Surrogate) -> Surrogate:
     if inner >= surface.inner:
         return surrogate
     nearer = baseline.with_surface(replace(surface, inner=inner))
-    return surrogate.with_energy(replace(surrogate.energy, baseline=nearer))
+    return surrogate.with_energy(replace(surrogate.hand_energy, baseline=nearer))
 
 
 def _places(model: PageModel) -> dict[str, Any] | None:

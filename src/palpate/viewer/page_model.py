@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from palpate.devices.hand_kind import HandKind
+from palpate.format import bind_units
 from palpate.input_words import input_in_words
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
@@ -92,7 +93,7 @@ class PageModel:
     def pad_words(self) -> str:
         """Return the pad's part in a press, in words; empty where there is no pad."""
         part = pad_part_of(self.body.energy, self.body.meta)
-        return "" if part is None else str(part)
+        return "" if part is None else bind_units(str(part))
 
     def modes(self, index: int) -> Modes:
         """Return what the page needs to sum up field `index` of the surface."""

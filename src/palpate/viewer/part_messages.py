@@ -201,3 +201,5 @@ class LearningProgress(Json):
     report: bool  # whether there is a report at ``/report``
     remaining: float | None  # estimated time until the next surrogate, s; null where it is not known
     share: float  # of the way to the next surrogate that is done, 0 to 1
+    painted_area: float | None = None  # that was to be touched, m²; null where it is not known
+    trained_area: float | None = None  # its part that is trained, m²

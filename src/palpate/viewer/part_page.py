@@ -91,6 +91,8 @@ class Progress:
         Estimated time until the next surrogate, s; not-a-number where it is not known.
     share : float
         Share of the way to the next surrogate that is done, 0 to 1.
+    painted_area, trained_area : float
+        Area that was to be touched, and its part that is trained, m²; not-a-number where they are not known.
     trial : str
         The latest surrogate beside the one before it, on the same solves, in words: which was kept, and both errors.
     """
@@ -106,6 +108,8 @@ class Progress:
     remaining: float = float("nan")
     share: float = 0.0
     trial: str = ""
+    painted_area: float = float("nan")
+    trained_area: float = float("nan")
 
 
 @dataclass(eq=False)
@@ -385,9 +389,15 @@ class PartPage(LocalServer):
         places = np.asarray(progress.places, dtype=float).reshape(-1, 3)
         if self._part is not None:
             places = on_surface(self._part, places)
-        median, p95, remaining = (
+        median, p95, remaining, painted, trained = (
             float(number) if np.isfinite(number) else None
-            for number in (progress.error_median, progress.error_p95, progress.remaining)
+            for number in (
+                progress.error_median,
+                progress.error_p95,
+                progress.remaining,
+                progress.painted_area,
+                progress.trained_area,
+            )
         )
         return LearningProgress(
             phase=progress.phase,
@@ -401,6 +411,8 @@ class PartPage(LocalServer):
             report=progress.report is not None,
             remaining=remaining,
             share=progress.share,
+            painted_area=painted,
+            trained_area=trained,
         )
 
     def _turn(self, stage: str, words: str) -> None:

@@ -118,6 +118,27 @@ PP_EXPORT("step") int32_t wasm_step(pp_real dt) {
   return flags;
 }
 
+/* Let go for dt seconds of a body that lies elsewhere after a touch: what was asked becomes the place where it then lies, and
+ * the answer there has no force; the flags. Any other body is answered where it is. */
+PP_EXPORT("release") int32_t wasm_release(pp_real dt) {
+  const pp_real *axis = wasm_arrays[PP_AXES].real; /* the one direction that is felt */
+  int32_t flags = wasm_ask();
+  int i, k;
+  if (flags & PP_NOT_A_NUMBER || !pp_finite(dt) || dt < R(0)) return flags | PP_NOT_A_NUMBER;
+  if (wasm_arrays[PP_HEAD].whole[PP_MEMORY_CODE] == 3) {
+    const pp_real wanted = iwan_elements_release(&wasm_model, wasm_state, dt);
+    for (k = 0; k < 12; k++) { /* Newton's method: the amplitude grows with the place along the axis */
+      const pp_real *s = wasm_answer + PP_SLOPE, steep = axis[0] * s[0] + axis[1] * s[1] + axis[2] * s[2];
+      const pp_real missing = wanted - wasm_answer[PP_AMPLITUDE];
+      if (!(steep > R(0)) || PP_ABS(missing) <= R(1e-12) * PP_ABS(wanted)) break;
+      for (i = 0; i < 3; i++) wasm_asked[i] += missing / steep * axis[i];
+      flags = wasm_ask();
+    }
+  }
+  for (i = 0; i < 3; i++) wasm_answer[PP_FORCE + i] = R(0);
+  return flags;
+}
+
 /* Go back to a body that nothing was done to. */
 PP_EXPORT("start") void wasm_start(void) {
   memset(wasm_state, 0, (4u + (size_t)wasm_arrays[PP_HEAD].whole[PP_STATE]) * sizeof *wasm_state);

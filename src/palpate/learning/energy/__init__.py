@@ -5,10 +5,12 @@ energy_images    a body's symmetry, in scaled inputs
 energy_problem   what the search needs of an energy: refinement, and errors of solves left out
 energy_search    kinds of units, growth, random starts, and the mean of the best networks
 trust            the posterior of the linear weights, calibrated by what leaving solves out has shown
+suspect_solves   solves that contradict their neighbours
 energy_export    the parts of an energy from what was found
 learn_energy     all of it, with the choice of a baseline
 """
 
 from palpate.learning.energy.learn_energy import EnergyHistory, learn_energy
+from palpate.learning.energy.suspect_solves import SuspectSolve
 
-__all__ = ["EnergyHistory", "learn_energy"]
+__all__ = ["EnergyHistory", "SuspectSolve", "learn_energy"]

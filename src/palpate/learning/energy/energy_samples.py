@@ -45,6 +45,7 @@ class EnergySamples:
     groups: np.ndarray  # (N,), solves of one number tell of each other
     inputs: tuple[Range, ...]  # names, units and trained ranges
     felt: int  # k
+    numbers: np.ndarray  # (N,), of the solves that they were made from
 
     @classmethod
     def of(cls, solves: Solves, baseline: Baseline) -> EnergySamples:
@@ -59,7 +60,7 @@ class EnergySamples:
         touching = s > 0
         _require_energy(s, E, touching, baseline.holds)
         resting = np.isfinite(K[:, :k, :k]).all(axis=(1, 2)) & ~touching & baseline.holds
-        samples = cls(X, E, F, (K + K.transpose(0, 2, 1)) / 2, s, np.arange(N), inputs, k)
+        samples = cls(X, E, F, (K + K.transpose(0, 2, 1)) / 2, s, np.arange(N), inputs, k, np.arange(N))
         samples = samples.take(touching | resting)
         return replace(samples, groups=baseline.groups(samples.X))
 
@@ -85,7 +86,7 @@ class EnergySamples:
 
     def take(self, which: np.ndarray) -> EnergySamples:
         """Return some of them, by index or mask."""
-        own = ("X", "energy", "force", "stiffness", "depth", "groups")
+        own = ("X", "energy", "force", "stiffness", "depth", "groups", "numbers")
         return replace(self, **{name: getattr(self, name)[which] for name in own})
 
     def targets(self, baseline: Baseline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

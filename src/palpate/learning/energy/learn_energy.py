@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -17,6 +17,7 @@ from palpate.learning.energy.energy_images import images_of
 from palpate.learning.energy.energy_problem import EnergyProblem
 from palpate.learning.energy.energy_samples import EnergySamples
 from palpate.learning.energy.energy_search import search_energy
+from palpate.learning.energy.suspect_solves import SuspectSolve, suspect_solves
 from palpate.learning.energy.trust import trust_of
 from palpate.learning.search import Budget, Candidate, Search, Trial
 from palpate.learning.starts import random_units
@@ -48,18 +49,27 @@ class EnergyHistory:
         them, as a geometric mean.
     meta : mapping
         What the body's record tells of the training.
+    suspects : tuple of SuspectSolve
+        Solves that contradict their neighbours; they were learnt from like all others.
     """
 
     trials: tuple[Trial, ...]
     errors: np.ndarray
     loo: float
     meta: dict[str, Any]
+    suspects: tuple[SuspectSolve, ...] = ()
+
+    def numbered(self, rows: np.ndarray) -> EnergyHistory:
+        """Return the history whose suspects have the numbers `rows` (N,) of their solves; negative ones are dropped."""
+        named = [replace(one, solve=int(rows[one.solve])) for one in self.suspects]
+        return replace(self, suspects=tuple(one for one in named if one.solve >= 0))
 
     def __str__(self) -> str:
         median, p95 = (share(float(np.quantile(self.errors, q))) for q in (0.5, 0.95))
+        words = "".join(f"; {one}" for one in self.suspects)
         return (
             f"{self.meta['solves']} solves, {len(self.trials)} networks of the energy tried; a solve left out is "
-            f"missed by {median} of its force (median), {p95} (95th percentile)"
+            f"missed by {median} of its force (median), {p95} (95th percentile){words}"
         )
 
     __repr__ = __str__
@@ -111,6 +121,7 @@ def learn_energy(
             trials = (*trials, *more)
         ensemble, further = search_energy(problem_of(baseline), options=options, budget=budget)
         trust = trust_of(ensemble, samples)
+        suspects = suspect_solves(samples, baseline, images)
     meta = training_meta(samples, ensemble, trust.errors)
     network, root = export_network(ensemble, trust.root, samples, meta)
     energy = LearntEnergy(
@@ -125,7 +136,7 @@ def learn_energy(
         ),
         root=root,
     )
-    return energy, EnergyHistory((*trials, *further), trust.errors, ensemble.error, meta)
+    return energy, EnergyHistory((*trials, *further), trust.errors, ensemble.error, meta, suspects)
 
 
 def _problem(

@@ -10,6 +10,7 @@ sphere_contact      a sphere's contact energy, and whether a state is admissible
 sphere_design       places and order in which a sphere's positions are solved
 surface_patch       a touched surface as triangles
 bump                the weight under a glued pad or a point force
+rigid_limit         the pad that stands for a rigid sphere
 pads                the pad's share of what a hand feels
 interaction_checks  directions, ranges, and whether a body can float away
 """

@@ -126,6 +126,8 @@ class Attached:
         going straight from `approach`; by default the Euclidean length.
     first_step : float
         Longest first step along a path, as such a length; later ones adapt.
+    stiffen : callable, optional
+        Gives a very stiff pad a share of its stiffness, 1 after attaching: a path is easier under a softer one.
     """
 
     parameters: tuple[Any, ...]
@@ -137,6 +139,7 @@ class Attached:
     approach: Callable[[np.ndarray], np.ndarray | None] = np.zeros_like
     distance: Callable[[np.ndarray, np.ndarray], float] | None = None
     first_step: float = np.inf
+    stiffen: Callable[[float], None] | None = None
 
 
 @runtime_checkable

@@ -148,8 +148,7 @@ def _aside(solution: Any) -> np.ndarray:
 
 def _with_pads(problem: Any, factor: float) -> Any:
     parts = tuple(
-        replace(part, pad=part.pad * factor) if hasattr(part, "pad") else part
-        for part in problem.interactions
+        replace(part, pad=part.pad * factor) if hasattr(part, "pad") else part for part in problem.acting
     )
     with warnings.catch_warnings():  # whoever asks for the pad's share knows
         warnings.simplefilter("ignore", ModelWarning)

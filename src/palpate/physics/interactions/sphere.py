@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -19,21 +19,26 @@ from palpate.physics.interactions.sphere_design import (
     group_into_chains,
     require_fit,
 )
+from palpate.physics.interactions.spread_places import depth_sequence, spread_places
 from palpate.physics.interactions.surface_patch import Patch, surface_of
 from palpate.physics.shapes.meshing import FineMesh
-from palpate.physics.shapes.naming import require_known
+from palpate.physics.shapes.naming import joint_name, require_known
 from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.interactions.sphere_contact import Contact
     from palpate.physics.shapes.shape import Geometry
 
-__all__ = ["SphereProbe"]
+__all__ = ["RIGID", "SphereProbe"]
 
 ELEMENT = 0.5  # element size under the probe over its radius: the force then ripples by < 0.2 % from 0.1 R of depth on
 ROUND_ELEMENT = 0.4  # the same on curved surfaces, where the elements' shape adds to the error
 # the same in bodies of several regions: on a skin over soft fat 0.5 makes the force 3 to 7 % too large
 LAYERED_ELEMENT = 0.25
+# the same under a rigid sphere: no pad evens its pressure out, and 0.5 makes the force 4 to 5 % too large
+RIGID_ELEMENT = 0.4
+RIGID = "rigid"
+"""The pad of a rigid sphere, for which a stiffness follows from the body."""
 MARGIN = 1.3  # how far beyond its contact points the probe may touch, over its radius
 # share of the radius: a box of contact points that ends so near to the surface's rim ends there
 END = 1e-3
@@ -64,16 +69,20 @@ class SphereProbe(PlainInteraction):
         R in m.
     touches : str
         Name of the surface that it presses.
-    pad : float
-        Stiffness k of the pad in N/m³. A modelling choice: the probe's own skin, in series with the body.
+    pad : float or "rigid"
+        Stiffness k of the pad in N/m³. A modelling choice: the probe's own skin, in series with the body. "rigid" takes
+        one so stiff that it leaves about 1 % of depth and force, by the body's modulus, radius and largest depth.
     stop : float or None
         Penetration p_m in m at which the pad is fully pressed. None for a pad without a stop, which swallows
-        the sphere beyond some depth: such solves fail then.
+        the sphere beyond some depth: such solves fail then. A rigid pad has none.
     depth : tuple of two floats
         Least and largest depth of the sphere's tip below the surface at rest, in m.
     over : tuple of two corners, optional
         Box of the contact points on the surface in m: ((x0, y0), (x1, y1)) or with z as well. By default the surface
         less a margin of 3 R, at most 0.4 of its width, in the directions along it.
+    rim : str, optional
+        Name of a surface around the touched one that the probe may meet too, at least as wide as the largest contact,
+        √(2 R d − d²) at the depth d. With it the contact points are all over the touched surface, without a margin.
 
     Raises
     ------
@@ -84,14 +93,16 @@ class SphereProbe(PlainInteraction):
 
     radius: float
     touches: str = "top"
-    pad: float = 2e6
+    pad: float | Literal["rigid"] = 2e6
     stop: float | None = 0.004
     depth: tuple[float, float] = (0.0, 0.015)
     over: tuple[Corner, Corner] | None = None
+    rim: str | None = None
 
     def __post_init__(self) -> None:
         checks.positive("The probe's radius", self.radius, "m")
-        checks.positive("The probe's pad stiffness", self.pad, "N/m³")
+        if self.pad != RIGID:
+            _require_pad(self.pad)
         if self.stop is not None:
             checks.positive("The probe's stop", self.stop, "m")
         object.__setattr__(self, "depth", range_of("The depth of a probe", self.depth, "m"))
@@ -99,14 +110,33 @@ class SphereProbe(PlainInteraction):
             object.__setattr__(self, "over", _checked_box(self.over))
 
     def __str__(self) -> str:
+        around = "" if self.rim is None else f" and its rim {self.rim!r}"
+        place = f"on {self.touches!r}{around}"
+        if isinstance(self.pad, str):
+            return f"rigid sphere of radius {millimetres(self.radius)} {place}"
         stop = f" with a stop at {millimetres(self.stop)}" if self.stop is not None else " without a stop"
-        return f"sphere of radius {millimetres(self.radius)} on {self.touches!r}, pad {number(self.pad)} N/m³{stop}"
+        return f"sphere of radius {millimetres(self.radius)} {place}, pad {number(self.pad)} N/m³{stop}"
+
+    def describe(self) -> dict[str, Any]:
+        """Return everything that decides its energy, as plain data; a rim only where there is one."""
+        plain = super().describe()
+        return {name: value for name, value in plain.items() if name != "rim" or value is not None}
+
+    @property
+    def meets(self) -> str:
+        """The joint name of the surfaces that it may meet: the touched one and its rim."""
+        return joint_name(self.touches, self.rim)
 
     def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
         """Return the ranges of c_x, c_y and c_z in m: the box around all its positions."""
-        patch = self._patch(geometry)
-        require_fit(patch, geometry.rest().points, self.over, max(self.depth), END * self.radius)
-        contacts, normals, _ = self._contact_points(patch, _GRID)
+        if self.rim is None:
+            patch = self._patch(geometry)
+            require_fit(patch, geometry.rest().points, self.over, max(self.depth), END * self.radius)
+            contacts, normals, _ = self._contact_points(patch, _GRID)
+        else:  # the corners of all triangles that are pressed
+            painted = self._painted(geometry)
+            corners = np.unique(painted.triangles)
+            contacts, normals = painted.points[corners], painted.node_normals[corners]
         ends = [contacts + normals * (self.radius - d) for d in self.depth]
         low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)
         pairs = zip("xyz", low.tolist(), high.tolist(), strict=True)
@@ -117,8 +147,8 @@ class SphereProbe(PlainInteraction):
         patch = Patch.from_mesh(geometry.rest(), self._surface(geometry))
         low, high = self._box(patch)
         low, high = low - MARGIN * self.radius, high + MARGIN * self.radius
-        element = _element(geometry, patch) * self.radius
-        return (FineMesh(self.touches, element, tuple(low.tolist()), tuple(high.tolist())),)
+        element = _element(geometry, patch, self.pad == RIGID) * self.radius
+        return (FineMesh(self.meets, element, tuple(low.tolist()), tuple(high.tolist())),)
 
     def design(self, geometry: Geometry, samples: int, seed: int, depths: int | None = None) -> np.ndarray:
         """Return positions (samples, 3) in m in depth series, each from shallow to deep.
@@ -126,10 +156,15 @@ class SphereProbe(PlainInteraction):
         The contact points are a scrambled Sobol sequence (Sobol 1967; Owen 1998) over the touched part of the
         surface, denser towards sides where the surface ends; the depths of a series are evenly spaced, all shifted by a
         random share of their distance. `depths` is their number in a series, by default about ¾ √samples.
+
+        With a rim the contact points are far from each other all over the touched surface, so that any first few are
+        spread (see `spread_places`); of one depth each, the depths are a golden sequence.
         """
+        count = depths_per_series(samples) if depths is None else depths
+        if self.rim is not None:
+            return self._spread_design(geometry, samples, seed, count)
         from scipy.stats import qmc
 
-        count = depths_per_series(samples) if depths is None else depths
         number = -(-samples // count)
         engine = qmc.Sobol(3, scramble=True, rng=np.random.default_rng(seed))
         unit, contacts = np.empty((0, 3)), np.empty((0, 3))
@@ -139,6 +174,27 @@ class SphereProbe(PlainInteraction):
         lines = zip(contacts[:number], normals, unit[hit, 2], strict=False)
         points = [self._series(contact, normal, count, shift) for contact, normal, shift in lines]
         return np.concatenate(points)[:samples]
+
+    def _spread_design(self, geometry: Geometry, samples: int, seed: int, count: int) -> np.ndarray:
+        """Return positions (samples, 3) in m over places that are far from each other."""
+        number = -(-samples // count)
+        contacts, normals = spread_places(self._painted(geometry), number, seed)
+        width = (self.depth[1] - self.depth[0]) / count
+        first = depth_sequence((self.depth[0], self.depth[0] + width), number, seed)
+        depths = first[:, None] + width * np.arange(count)
+        points = contacts[:, None] + (self.radius - depths)[:, :, None] * normals[:, None]
+        return np.asarray(points.reshape(-1, 3)[:samples])
+
+    def random_presses(self, geometry: Geometry, samples: int, seed: int) -> np.ndarray:
+        """Return positions (samples, 3) in m, independent of each other, even over the touched area and all depths.
+
+        They judge a surrogate by what was to be touched, margin and rim of its design aside.
+        """
+        rng = np.random.default_rng(seed)
+        touched = surface_of(geometry, self.touches, self.refinements(geometry))
+        contacts, normals = touched.spread_with_normals(rng.random((samples, 2)))
+        depths = rng.uniform(*self.depth, samples)
+        return np.asarray(contacts + (self.radius - depths)[:, None] * normals)
 
     def chains(self, geometry: Geometry, points: np.ndarray) -> list[np.ndarray]:
         """Return rows of positions (N, 3) in chains: depth series, else neighbours, from shallow to deep."""
@@ -158,15 +214,31 @@ class SphereProbe(PlainInteraction):
         return np.asarray(centres + (radius - self.radius) * normals)
 
     def attach(self, field: Field) -> Attached:
-        """Return its contact energy on an opened body."""
+        """Return its contact energy on an opened body.
+
+        Raises
+        ------
+        UsageError
+            For a rigid sphere that no problem has given a pad.
+        """
+        if isinstance(self.pad, str):
+            raise UsageError(
+                "A rigid sphere can't be attached by itself.",
+                why="The stiffness of its pad follows from the body.",
+                fix="Put a body under it: body.problem(probe).",
+            )
+        return self.attach_pad(field, self.pad)
+
+    def attach_pad(self, field: Field, pad: Any) -> Attached:
+        """Return its contact energy on an opened body with a stiffness, a number in N/m³ or a parameter of NGSolve."""
         import ngsolve
 
         from palpate.physics.interactions.sphere_contact import Contact, pad_energy
 
-        contact = Contact(field, field.rest, self.touches, self.radius, self.stop)
+        contact = Contact(field, field.rest, self.meets, self.radius, self.stop)
         centre = tuple(ngsolve.Parameter(0.0) for _ in range(3))
         penetration = contact.penetration(field.trial, ngsolve.CF(centre))
-        energy = Energy(pad_energy(penetration, self.pad, self.stop), contact.measure())
+        energy = Energy(pad_energy(penetration, pad, self.stop), contact.measure())
         approach = _Approach(self, field, contact)
         return Attached(
             centre,
@@ -183,11 +255,18 @@ class SphereProbe(PlainInteraction):
         return float(min(FIRST * self.radius, pressed, FIRST_DEPTH * max(map(abs, self.depth))))
 
     def _surface(self, geometry: Geometry) -> str:
-        require_known("surface", self.touches, geometry.surfaces)
+        for name in (self.touches, *([] if self.rim is None else [self.rim])):
+            require_known("surface", name, geometry.surfaces)
         return self.touches
 
     def _patch(self, geometry: Geometry) -> Patch:
-        return surface_of(geometry, self.touches, self.refinements(geometry))
+        """Return the surface that it may meet."""
+        return surface_of(geometry, self.meets, self.refinements(geometry))
+
+    def _painted(self, geometry: Geometry) -> Patch:
+        """Return the surface that is pressed, with a rim: the touched one, or its part in a given box."""
+        painted = surface_of(geometry, self.touches, self.refinements(geometry))
+        return painted if self.over is None else _within(painted, *self._box(painted))
 
     def _box(self, patch: Patch) -> tuple[np.ndarray, np.ndarray]:
         """Return the lower and upper corner (3,) in m of the box of contact points."""
@@ -195,6 +274,7 @@ class SphereProbe(PlainInteraction):
         if self.over is not None:
             for axis, (a, b) in enumerate(zip(*self.over, strict=True)):
                 low[axis], high[axis] = a, b
+        if self.over is not None or self.rim is not None:
             return low, high
         # along the surface only: a closed one faces nowhere in the mean and has no rim
         along = (np.abs(patch.facing) < 0.5 * np.linalg.norm(patch.facing)) & _is_open(patch)
@@ -243,7 +323,7 @@ class _Approach:
         """The touched surface under the constant loads alone."""
         if self._known is None:
             displacement = self._field.at_nodes(self._field.base)
-            self._known = Patch.from_mesh(self._field.rest, self._probe.touches, displacement)
+            self._known = Patch.from_mesh(self._field.rest, self._probe.meets, displacement)
         return self._known
 
     def __call__(self, centre: np.ndarray) -> np.ndarray | None:
@@ -274,10 +354,22 @@ class _Approach:
 _GRID = np.stack(np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9)), axis=-1).reshape(-1, 2)
 
 
-def _element(geometry: Geometry, patch: Patch) -> float:
+def _require_pad(pad: Any) -> None:
+    if isinstance(pad, str):
+        raise UsageError(
+            f"The pad of a probe is {pad!r}.",
+            why="It is a stiffness in N/m³, or the word that asks for none that is felt.",
+            fix='Give a number such as 2e6, or "rigid".',
+        )
+    checks.positive("The probe's pad stiffness", pad, "N/m³")
+
+
+def _element(geometry: Geometry, patch: Patch, is_rigid: bool) -> float:
     """Return the element size under the probe over its radius."""
     if len(geometry.regions) > 1:
         return LAYERED_ELEMENT
+    if is_rigid:
+        return RIGID_ELEMENT
     return ELEMENT if patch.is_plane else ROUND_ELEMENT
 
 

@@ -7,6 +7,7 @@ corners the elements of a round body bulge out of its straight triangles, by h²
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, cast
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from palpate.physics.shapes.mesh import BodyMesh
+from palpate.physics.shapes.naming import members
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -117,14 +119,27 @@ class Patch:
 
     def spread(self, unit: np.ndarray) -> np.ndarray:
         """Return points (N, 3) spread evenly over the area, from places (N, 2) in the unit square."""
+        chosen, weights = self._spread_weights(unit)
+        return np.asarray(np.einsum("nk,nki->ni", weights, self.corners[chosen]))
+
+    def spread_with_normals(self, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return points (N, 3) as `spread` does, and the outward unit normals (N, 3) there, as `nearest` has them."""
+        chosen, weights = self._spread_weights(unit)
+        normals = np.einsum("nk,nki->ni", weights, self.node_normals[self.triangles[chosen]])
+        return (
+            np.asarray(np.einsum("nk,nki->ni", weights, self.corners[chosen])),
+            np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True)),
+        )
+
+    def _spread_weights(self, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return triangles (N,) and barycentric weights (N, 3) of places (N, 2) in the unit square, even by area."""
         area = np.linalg.norm(self.area_vectors, axis=1)
         edges = np.concatenate([[0.0], np.cumsum(area)]) / area.sum()
         chosen = np.clip(np.searchsorted(edges, unit[:, 0], side="right") - 1, 0, len(area) - 1)
         # what is left of the first number within its triangle serves as the second one
         rest = np.clip((unit[:, 0] - edges[chosen]) / (edges[chosen + 1] - edges[chosen]), 0.0, 1.0)
         root = np.sqrt(rest)
-        weights = np.stack([1 - root, root * (1 - unit[:, 1]), root * unit[:, 1]], axis=1)
-        return np.asarray(np.einsum("nk,nki->ni", weights, self.corners[chosen]))
+        return chosen, np.stack([1 - root, root * (1 - unit[:, 1]), root * unit[:, 1]], axis=1)
 
 
 def _barycentric(a: np.ndarray, b: np.ndarray, c: np.ndarray, place: np.ndarray) -> np.ndarray:
@@ -184,7 +199,8 @@ def _split_elements(geometry: Hashable, surface: str, refinements: tuple[FineMes
     mesh = cast("Any", geometry).mesh(refinements)
     corners, pattern = _pattern(PARTS)
     rule = ngs.IntegrationRule([tuple(corner) for corner in corners.tolist()], [1.0] * len(corners))
-    points = mesh.MapToAllElements(rule, mesh.Boundaries(surface))
+    names = "|".join(re.escape(name) for name in members(surface, mesh.GetBoundaries()))
+    points = mesh.MapToAllElements(rule, mesh.Boundaries(names))
     places = np.asarray(ngs.CF((ngs.x, ngs.y, ngs.z))(points))
     normals = np.asarray(ngs.specialcf.normal(3)(points)).reshape(-1, len(corners), 3).mean(axis=1)
     nodes, numbers = _unique_points(places)

@@ -69,7 +69,7 @@ TISSUES: dict[str, Tissue] = {
         ),
         Tissue(
             "skin", 35e3, 5e3, 140e6, 1090.0,
-            "dermis, 35 kPa by pressing; 5 kPa to 140 MPa over all ways of measuring",
+            "dermis, about 35 kPa by pressing; 5 kPa to 140 MPa over all ways of measuring",
             (PAILLER, KALRA),
         ),
         Tissue(

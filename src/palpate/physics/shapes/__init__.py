@@ -5,7 +5,8 @@ dome        Dome, Inclusion            organ       Organ
 solid_file  a body from a CAD file or a closed surface; cad_file reads solids, detail_size bounds their details;
             surface_file reads surfaces, stl_text those of STL, polygon_faces cuts polygons of OBJ; filled_surface
             checks, names and fills them, surface_repair mends small faults of exports, surface_checks refuses what
-            bounds no body, surface_simplify makes large ones smaller
+            bounds no body, surface_simplify makes large ones smaller,
+            surface_wrap lays a closed one around what cuts itself
 mesh_file   a body from a volume mesh; mesh_source reads it, abaqus_file, gmsh_file, vtk_file some forms; mesh_groups
             has its cells and their names, mesh_cells splits them into tetrahedra
 packed_file files as they lie on the disk: packed, of any case, and whether their heads can be true

@@ -234,6 +234,13 @@ class SurfacePatch:
     triangles : str
         Triangles of the surface as it is read, such as ``"0-17 25 40-80 of 5120"``: what was picked on a page. Not for
         STEP files.
+    around : str
+        Name of another surface: the patch is what lies around it on the same side of the body, as far as `reach`. Not
+        for STEP files.
+    reach : float
+        Largest distance in m between the centre of a part of the patch and that of a part of the surface `around`.
+    spared : tuple of str
+        Surfaces that a patch around another one leaves as they are, such as those that are held.
 
     Raises
     ------
@@ -249,6 +256,9 @@ class SurfacePatch:
     within: float = WITHIN
     faces: tuple[str, ...] = ()
     triangles: str = field(default="", repr=False)
+    around: str = ""
+    reach: float = 0.0
+    spared: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         require_name("The name of a patch", self.name)
@@ -257,11 +267,15 @@ class SurfacePatch:
             read_triangles(self.triangles)
         boxed = self.lower is not None or self.upper is not None
         places = boxed + (self.where is not None)
-        if places > 1 or not (places or self.faces or self.facing is not None or self.triangles):
+        if self.around:
+            checks.positive("The reach of a patch around a surface", self.reach, "m")
+        if places > 1 or not (
+            places or self.faces or self.facing is not None or self.triangles or self.around
+        ):
             raise UsageError(
                 f"The patch {self.name!r} has no clear place.",
-                why="It is a box, a function, a direction that it faces, or surfaces of the file; a box and a function "
-                "exclude each other.",
+                why="It is a box, a function, a direction that it faces, surfaces of the file, or what is around "
+                "another surface; a box and a function exclude each other.",
                 fix="Pass lower=(x, y, z) and upper=(x, y, z), or where=function, facing=(0, 0, 1), faces=(name,).",
             )
         for corner, word in (("lower", "lower"), ("upper", "upper")):
@@ -326,6 +340,20 @@ class SurfacePatch:
             inside = inside & self._listed(len(centres))
         return inside
 
+    def surrounds(self, centres: np.ndarray, normals: np.ndarray | None, labels: np.ndarray) -> np.ndarray:
+        """Return which parts (n,) lie around the surface `around`, by the names (n,) that all parts have so far.
+
+        The back of a thin wall is near the surface too, and faces the other way: it does not belong.
+        """
+        from scipy.spatial import cKDTree
+
+        middle = labels == self.around
+        if not middle.any() or normals is None:
+            return np.zeros(len(centres), dtype=bool)
+        distance, nearest = cKDTree(centres[middle]).query(centres)
+        same_side = np.einsum("ni,ni->n", normals, normals[middle][nearest]) > 0
+        return np.asarray((distance <= self.reach) & same_side & ~middle & ~np.isin(labels, self.spared))
+
     def _listed(self, present: int) -> np.ndarray:
         """Return which of the triangles that are present (present,) stand in the list."""
         listed, count = read_triangles(self.triangles)
@@ -351,6 +379,8 @@ class SurfacePatch:
         if self.facing is not None:
             plain |= {"facing": self.facing, "within": self.within}
         plain |= {"faces": self.faces} if self.faces else {}
+        if self.around:
+            plain |= {"around": self.around, "reach": self.reach, "spared": self.spared}
         return plain | ({"triangles": self.triangles} if self.triangles else {})
 
 
@@ -402,6 +432,8 @@ def apply_patches(
     given = label.copy()
     for patch in patches:
         inside = patch.contains(centres, normals, given)
+        if patch.around:
+            inside = inside & patch.surrounds(centres, normals, label)
         if not inside.any():
             low, high = (", ".join(f"{v:.4g}" for v in f(axis=0)) for f in (centres.min, centres.max))
             raise UsageError(

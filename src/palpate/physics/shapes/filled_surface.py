@@ -27,6 +27,7 @@ from palpate.physics.shapes.surface_checks import require_closed, shells_of, sur
 from palpate.physics.shapes.surface_file import parse_surface
 from palpate.physics.shapes.surface_repair import Surface, is_manifold, open_edges, place, repair_surface
 from palpate.physics.shapes.surface_simplify import MANY, TOLERANCE, simplify_surface
+from palpate.physics.shapes.surface_wrap import wrap_surface
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -34,23 +35,29 @@ if TYPE_CHECKING:
 __all__ = ["bodies_apart", "fill_surface", "name_parts", "read_surface"]
 
 LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
+WRAP_SIMPLIFIED = 0.05  # of a wrap's size: how far its many small triangles are simplified
 FLAT = 1e-7  # thickness over length below which a surface lies in a plane
 # weight of a normal's direction against distance over the body's length, where faces are compared
 SHARP = 0.05
 
 
-def read_surface(path: str, unit: str, simplify: float | None = None) -> tuple[Trimesh, Surface, Surface]:
+def read_surface(
+    path: str, unit: str, simplify: float | None = None, wrap: float | None = None
+) -> tuple[Trimesh, Surface, Surface]:
     """Read the surface of a file, repaired, simplified if it is large, and searched for faults.
 
     `unit` is a key of `UNITS`. `simplify` is the distance in m by which a surface of more than 20,000 triangles may
-    be simplified; by default 1/2,000 of its length, 0 for not at all. Returns the surface with its edges, in m, and
-    the same with the names of the file's parts and a note about each repair, and the surface before it was simplified.
+    be simplified; by default 1/2,000 of its length, 0 for not at all. With `wrap`, a size in m, a closed surface is
+    laid around the file's, whatever faults that has. Returns the surface with its edges, in m, and the same with the
+    names of the file's parts and a note about each repair, and the surface before it was simplified.
     """
     surface = parse_surface(path)
     surface = replace(surface, points=surface.points * UNITS[unit])
     require_size(path, surface.length, unit)
     _require_thickness(path, surface)
-    surface = _turn_outwards(repair_surface(surface))
+    surface = wrap_surface(surface, wrap)[0] if wrap else _turn_outwards(repair_surface(surface))
+    if wrap and simplify is None:
+        simplify = WRAP_SIMPLIFIED * wrap
     topology, whole = _simplify(path, surface, simplify)
     tell_repairs(path, surface.notes)
     return topology, whole, surface

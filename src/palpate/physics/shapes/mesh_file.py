@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -28,6 +29,7 @@ from palpate.physics.shapes.mesh_cells import duplicate_cells, merge_nodes, shor
 from palpate.physics.shapes.mesh_groups import Group, MeshSource
 from palpate.physics.shapes.mesh_source import read_source
 from palpate.physics.shapes.meshing import MOST_ELEMENTS, FineMesh, boxes_meet
+from palpate.physics.shapes.naming import AND
 from palpate.physics.shapes.shape import Shape, require_size
 from palpate.physics.shapes.surface_checks import touching_shells
 from palpate.physics.shapes.surface_repair import place
@@ -321,9 +323,10 @@ def _require_manifold(surface: Trimesh, source: str) -> None:
 def _bisect(mesh: Any, refinement: FineMesh) -> None:
     """Bisect the tetrahedra behind a part of a surface until their edges there are short enough."""
     name = refinement.surface
+    pattern = "|".join(re.escape(part) for part in name.split(AND))
     for _ in range(40):
         marked = set()
-        for face in mesh.Boundaries(name).Elements():
+        for face in mesh.Boundaries(pattern).Elements():
             corners = np.array([mesh[v].point for v in face.vertices])
             longest = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max()
             if longest > 1.5 * refinement.element and boxes_meet(

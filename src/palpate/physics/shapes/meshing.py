@@ -18,7 +18,7 @@ import numpy as np
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.physics.shapes.mesh import BodyMesh, body_mesh
-from palpate.physics.shapes.naming import GROUPS, members
+from palpate.physics.shapes.naming import AND, GROUPS, members
 
 __all__ = [
     "GRADING",
@@ -88,7 +88,7 @@ class FineMesh:
 
     def is_on(self, name: str | None) -> bool:
         """Return True for the refined surface, and for those that its name stands for."""
-        return name == self.surface or name in GROUPS.get(self.surface, ())
+        return any(name == part or name in GROUPS.get(part, ()) for part in self.surface.split(AND))
 
 
 def require_budget(volumes: Iterable[tuple[float, float]], fine: Iterable[tuple[float, float]]) -> None:
@@ -301,7 +301,9 @@ def _patch(face: Any, lower: np.ndarray, upper: np.ndarray) -> list[Any]:
         corner[axis], corner[across[0]], corner[across[1]] = level, first[across[0]], second[across[1]]
         corners.append(Pnt(*corner.tolist()))
     rectangle = Face(Wire([Segment(p, q) for p, q in pairwise([*corners, corners[0]])]))
-    return [rectangle * face]
+    patch = rectangle * face
+    # a face that was cut before need not reach the rectangle, though its box does
+    return [patch] if list(patch.faces) else []
 
 
 def _restricted_faces(solid: Any, refinements: list[FineMesh]) -> list[tuple[float, float]]:

@@ -9,20 +9,38 @@ from typing import Any
 from palpate.checks import did_you_mean
 from palpate.errors import UsageError
 
-__all__ = ["GROUPS", "INTERFACE", "UPRIGHT", "members", "plain_name", "require_known", "require_name"]
+__all__ = [
+    "GROUPS",
+    "INTERFACE",
+    "UPRIGHT",
+    "joint_name",
+    "members",
+    "plain_name",
+    "require_known",
+    "require_name",
+]
 
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # the upright faces of a box, by where they are
 GROUPS = {"side": UPRIGHT}
+AND = " + "  # between surfaces that are named together; a name of one has no such sign
 INTERFACE = "between regions"  # name of the faces that are no part of the outer surface
 
 
 def members(name: str, surfaces: Iterable[str]) -> tuple[str, ...]:
-    """Surfaces that a name stands for: itself, or the four upright faces of a box for ``"side"``; or none."""
+    """Surfaces that a name stands for: itself, those of a joint name, a box's upright faces (``"side"``); or none."""
     names = tuple(surfaces)
+    if isinstance(name, str) and AND in name:
+        parts = [members(part, names) for part in name.split(AND)]
+        return tuple(dict.fromkeys(sum(parts, ()))) if all(parts) else ()
     if name in names:
         return (name,)
     group = GROUPS.get(name, ()) if isinstance(name, str) else ()
     return group if group and set(group) <= set(names) else ()
+
+
+def joint_name(*names: str | None) -> str:
+    """Return the name that stands for several surfaces together; None is none of them."""
+    return AND.join(name for name in names if name is not None)
 
 
 def require_known(kind: str, name: str, known: Iterable[str]) -> None:

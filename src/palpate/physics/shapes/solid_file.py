@@ -60,6 +60,10 @@ class ImportedSolid(Shape):
     simplify : float, optional
         Distance in m by which a surface of more than 20,000 triangles may be simplified; by default
         1/2,000 of its length, 0 for not at all. `notes` tells how far it is from the file's.
+    wrap : float, optional
+        Size in m by which a closed surface is wrapped around one that cuts itself or has holes or triangles inside out:
+        it lies about so far from the file's at most, and what is thinner may vanish. `notes` tells how far it lies.
+        Left out: the file's surface is taken as it is, and refused where it bounds no body.
     digest : str
         SHA-256 of the file, found when the value is made: the body is the file's content, not its name.
 
@@ -78,6 +82,7 @@ class ImportedSolid(Shape):
     patches: tuple[SurfacePatch, ...] = ()
     feature_angle: float = FEATURE_ANGLE
     simplify: float | None = None
+    wrap: float | None = None
     digest: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
@@ -88,6 +93,8 @@ class ImportedSolid(Shape):
         checks.positive("The feature angle", self.feature_angle, "degrees")
         if self.simplify is not None:
             checks.fits("The distance by which a surface is simplified", self.simplify, "m", least=0)
+        if self.wrap is not None:
+            checks.positive("The size of a wrap", self.wrap, "m")
         self._check_kind()
         if not self.digest:
             object.__setattr__(self, "digest", digest_of(self.path))
@@ -113,6 +120,12 @@ class ImportedSolid(Shape):
             )
         if self.unit is not None:
             require_unit(self.unit)
+        if self.wrap is not None and self.is_cad:
+            raise UsageError(
+                f"{self.path} is a CAD file, and can't be wrapped.",
+                why="A wrap closes a surface of triangles.",
+                fix="Leave wrap out, or export the part as STL.",
+            )
 
     foreign = True
 
@@ -150,7 +163,9 @@ class ImportedSolid(Shape):
         A larger surface is simplified within 1/2,000 of its length.
         """
         return (
-            None if self.is_cad else _drawn_surface(self.path, self.digest, self.unit or "m", self.simplify)
+            None
+            if self.is_cad
+            else _drawn_surface(self.path, self.digest, self.unit or "m", self.simplify, self.wrap)
         )
 
     @property
@@ -175,7 +190,8 @@ class ImportedSolid(Shape):
             "feature_angle": self.feature_angle,
             "sha256": self.digest,
         }
-        return plain if self.simplify is None else plain | {"simplify": self.simplify}
+        further = {"simplify": self.simplify, "wrap": self.wrap}
+        return plain | {name: value for name, value in further.items() if value is not None}
 
     def __str__(self) -> str:
         return f"solid of {Path(self.path).name}"
@@ -229,24 +245,28 @@ def _read_names(shape: ImportedSolid) -> tuple[tuple[str, ...], tuple[str, ...],
 @lru_cache(maxsize=8)
 def _skin(shape: ImportedSolid) -> tuple[BodyMesh, float, tuple[str, ...]]:
     """Named surface of a file, the volume in it in m³, and notes about repairs."""
-    topology, surface, _ = _whole_surface(shape.path, shape.digest, shape.unit or "m", shape.simplify)
+    topology, surface, _ = _whole_surface(
+        shape.path, shape.digest, shape.unit or "m", shape.simplify, shape.wrap
+    )
     skin = name_parts(topology, surface, shape.patches, shape.feature_angle)
     return skin, float(topology.volume), (*surface.notes, *bodies_apart(topology))
 
 
 @lru_cache(maxsize=2)
 def _drawn_surface(
-    path: str, digest: str, unit: str, simplify: float | None
+    path: str, digest: str, unit: str, simplify: float | None, wrap: float | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points and triangles of a file's surface for pictures."""
-    surface = _whole_surface(path, digest, unit, simplify)[2]
+    surface = _whole_surface(path, digest, unit, simplify, wrap)[2]
     if len(surface.triangles) > MOST_DRAWN and is_manifold(surface.triangles):
         surface = simplify_surface(surface, TOLERANCE * surface.length, MOST_DRAWN)
     return surface.points, surface.triangles
 
 
 @lru_cache(maxsize=2)
-def _whole_surface(path: str, digest: str, unit: str, simplify: float | None) -> tuple[Any, Any, Any]:
+def _whole_surface(
+    path: str, digest: str, unit: str, simplify: float | None, wrap: float | None
+) -> tuple[Any, Any, Any]:
     """Surface of a file, which all patches of it share: large ones take seconds to simplify."""
     require_same(path, digest)
-    return read_surface(path, unit, simplify)
+    return read_surface(path, unit, simplify, wrap)

@@ -30,6 +30,7 @@ __all__ = [
 
 FLUSH = 1e-6  # of the body's length, below which two faces lie on each other
 CLOSE = 64  # triangles whose distance to a point is measured
+WRAPPED = 80.0  # a body's length over the size of the wrap that is proposed
 PAIRS = 500_000  # pairs of triangles that are compared at a time
 
 
@@ -47,7 +48,8 @@ def require_closed(surface: Trimesh, source: str) -> None:
         raise UsageError(
             f"The surface of {source} is open: {len(open_edges)} edges belong to one triangle only.",
             why=f"There {_where('hole', surface, open_edges)}, and a body needs a closed surface.",
-            fix="Close the hole in the program that made the file, with its repair or fill-holes function.",
+            fix="Close the hole in the program that made the file, with its repair or fill-holes function, or have it "
+            f"wrapped: {_wrap_words(surface)}.",
         )
     if len(crowded):
         raise UsageError(
@@ -61,7 +63,7 @@ def require_closed(surface: Trimesh, source: str) -> None:
         raise UsageError(
             f"The triangles of {source} disagree on which side is outside, along {twice} edges.",
             why="Some of them are inverted: their corners run the other way than their neighbours'.",
-            fix="Make the normals consistent (recalculate outside) and export again.",
+            fix=f"Recalculate the normals, and export again, or have it wrapped: {_wrap_words(surface)}.",
         )
     if len(pinched := _pinch_points(surface)):
         raise UsageError(
@@ -74,7 +76,7 @@ def require_closed(surface: Trimesh, source: str) -> None:
             f"The surface of {source} cuts itself: triangles {crossing[0]} and {crossing[1]} cross.",
             why=f"They do so near {place(surface.triangles_center[crossing[0]])}; a body's surface has an inside and "
             "an outside everywhere.",
-            fix="Unite overlapping parts (Boolean union) in the program that made the file.",
+            fix=f"Have it wrapped, which moves the surface a little: {_wrap_words(surface)}.",
         )
     if (contact := touching_shells(surface)) is not None:
         first, second, centre = contact
@@ -84,6 +86,15 @@ def require_closed(surface: Trimesh, source: str) -> None:
             fix="Unite the parts (Boolean union) in the program that made the file, or move them apart.",
         )
     _require_outside(surface, shells_of(surface), source)
+
+
+def _wrap_words(surface: Trimesh) -> str:
+    """Return how to have a surface wrapped, by about an eightieth of its length."""
+    size = float(f"{1e3 * float(surface.extents.max()) / WRAPPED:.1g}")
+    return (
+        f"`palpate touch` with --wrap {size:g}mm, wrap = '{size:g} mm' in a study's [body], or "
+        f"ImportedSolid(…, wrap={1e-3 * size:g})"
+    )
 
 
 def _where(word: str, surface: Trimesh, edges: np.ndarray) -> str:

@@ -244,6 +244,8 @@ class FamilyProblem:
     varied: tuple[Varied, ...]
 
     def __post_init__(self) -> None:
+        # the same pad under all members, or its energies were of different functions
+        object.__setattr__(self, "base", replace(self.base, interactions=self.base.acting))
         if self._radius is None:
             return
         probe = self._probe

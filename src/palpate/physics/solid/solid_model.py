@@ -12,6 +12,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.physics.interactions.interaction import Attached, Energy
 from palpate.physics.interactions.interaction_checks import require_support
+from palpate.physics.interactions.rigid_limit import with_rigid_pad
 from palpate.physics.materials.pre_stretched import PreStretched
 from palpate.physics.solid.solid_energy import History, material_energies
 from palpate.physics.solid.solid_field import SolidField
@@ -293,6 +294,17 @@ class SolidModel:
                 total += float(np.linalg.norm(there[rows] - here[rows])) ** 2
         return float(np.sqrt(total))
 
+    @property
+    def has_stiff_pads(self) -> bool:
+        """True where a path is easier under a softer pad, see `stiffen`."""
+        return any(part.stiffen is not None for part in self.inputs.attached)
+
+    def stiffen(self, share: float) -> None:
+        """Give very stiff pads a share of their stiffness."""
+        for part in self.inputs.attached:
+            if part.stiffen is not None:
+                part.stiffen(share)
+
     def first_step(self) -> float:
         """Return the longest first step along a path, as a distance between inputs."""
         return min((part.first_step for part in self.inputs.attached), default=np.inf)
@@ -318,7 +330,7 @@ def open_problem(problem: SolidProblem, solver: str, tolerance: float) -> OpenPr
         settled = _settle(alone, constants)
         base = settled.last.z
         field.set_base(base)
-    varied = [interaction.attach(field) for interaction in problem.interactions]
+    varied = [interaction.attach(field) for interaction in problem.acting]
     if not constants:
         require_support(field, varied)
     model = SolidModel(elements, constants, varied, base)
@@ -356,7 +368,10 @@ def _settle(model: SolidModel, constants: list[ConstantInteraction]) -> PathResu
 def _constants(field: SolidField, body: Body) -> list[ConstantInteraction]:
     """Return gravity and the interactions that always act."""
     constants = [
-        ConstantInteraction(held.interaction.attach(field), np.asarray(held.values, dtype=float))
+        ConstantInteraction(
+            with_rigid_pad(held.interaction, body.materials).attach(field),
+            np.asarray(held.values, dtype=float),
+        )
         for held in body.held
     ]
     if any(body.gravity):

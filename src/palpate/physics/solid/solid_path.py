@@ -14,6 +14,7 @@ time.
 from __future__ import annotations
 
 import logging
+import math
 import sys
 import time
 from collections.abc import Iterator
@@ -29,7 +30,16 @@ if TYPE_CHECKING:
     from palpate.physics.solid.solid_model import SolidModel
     from palpate.physics.solid.solid_newton import NewtonResult
 
-__all__ = ["LoadStep", "PathPoint", "PathResult", "StepResult", "follow", "predict", "take_step"]
+__all__ = [
+    "LoadStep",
+    "PathPoint",
+    "PathResult",
+    "StepResult",
+    "follow",
+    "follow_softened",
+    "predict",
+    "take_step",
+]
 
 STRAIGHT = 0.999  # cosine from which on two steps are on one line
 SMALLEST_STEP = 2.0**-10  # shortest step, as a share of the whole path
@@ -48,6 +58,9 @@ MOST_STEPS = 400  # a body that flows without end, near collapse, is followed in
 EASY, HARD = 3, 6  # factorisations of a search up to which steps grow, beyond which they shrink
 GROWTH, SHRINKAGE = 1.6, 0.7
 LONGEST, SHORTEST, SAFETY = 4.0, 0.2, 0.8  # factors of the next step that the error in time allows
+
+# share of a very stiff pad's stiffness on the way, factor of a step from there, and the least after halvings
+SOFT, STIFFENING, LEAST_STIFFENING = 1 / 16, 4.0, 1.1
 
 logger = logging.getLogger("palpate.physics.solid")  # progress, for those who ask for it
 
@@ -255,6 +268,37 @@ def follow(model: SolidModel, start: PathPoint, target: np.ndarray) -> PathResul
         if step < _smallest(tried) or spent >= MOST_ITERATIONS or len(log) >= MOST_STEPS or watch.futile:
             watch.end()
             return PathResult(here, _given_up(tried, spent, len(log), watch.reason), tuple(log))
+
+
+def follow_softened(model: SolidModel, start: PathPoint, q: np.ndarray) -> PathResult:
+    """Follow the way from outside under softened pads, where they are very stiff, and stiffen them at its end.
+
+    The steps are in ln k, each from the equilibrium before; one that fails is halved. Where none succeeds the way is
+    followed under the stiff pads themselves.
+    """
+    if not model.has_stiff_pads or model.histories:
+        return follow(model, start, q)
+    try:
+        model.stiffen(SOFT)
+        path = follow(model, start, q)
+        share, factor, log, z = SOFT, STIFFENING, path.log, path.last.z
+        if path.verdict.stop is not Stop.CONVERGED:
+            factor = 1.0
+        while share < 1.0 and factor > LEAST_STIFFENING:
+            model.stiffen(min(share * factor, 1.0))
+            end = model.search(q, z, fresh=True)
+            tried = StepResult(end.z, _verdict(model, end, q), (end,))
+            log = (*log, _record(1.0, 0.0, tried))
+            if tried.good:
+                share, z = min(share * factor, 1.0), tried.z
+            else:
+                factor = math.sqrt(factor)
+    finally:
+        model.stiffen(1.0)
+    if share < 1.0:
+        again = follow(model, start, q)
+        return replace(again, log=log + again.log)
+    return PathResult(PathPoint(q, z), model.judge(z, q), log)
 
 
 class _Watch:

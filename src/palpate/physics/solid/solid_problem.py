@@ -17,7 +17,8 @@ from palpate.physics.apart import is_foreign, solve_apart
 from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.pads import advise_on_pad
-from palpate.physics.interactions.sphere import SphereProbe
+from palpate.physics.interactions.rigid_limit import with_rigid_pad
+from palpate.physics.interactions.sphere import RIGID, SphereProbe
 from palpate.physics.shapes.divided_surface import MOST_DRAWN, divide_large
 from palpate.physics.shapes.naming import require_known
 from palpate.physics.solid.body_symmetry import symmetry_of
@@ -92,7 +93,7 @@ class SolidProblem:
         require_no_loose_part(self.body, self.interactions)
         for interaction in self.interactions:
             advise_on_sizes(interaction, self.element, self.longest)
-            if isinstance(interaction, SphereProbe):
+            if isinstance(interaction, SphereProbe) and interaction.pad != RIGID:
                 advise_on_pad(interaction, self.body.materials)
 
     def _require_surface(self, interaction: Any) -> None:
@@ -127,6 +128,11 @@ class SolidProblem:
         if self.element is not None:
             wanted = [replace(r, element=self.element) for r in wanted]
         return tuple(wanted)
+
+    @property
+    def acting(self) -> tuple[Interaction, ...]:
+        """The interactions with a number for the pad of a rigid sphere: the same one at all inputs."""
+        return tuple(with_rigid_pad(part, self.body.materials) for part in self.interactions)
 
     @property
     def mesh(self) -> BodyMesh:
@@ -171,7 +177,10 @@ class SolidProblem:
         return {
             "type": "SolidProblem",
             "body": self.body.describe(),
-            "interactions": [interaction.describe() for interaction in self.interactions],
+            "interactions": [
+                {**wanted.describe(), **({} if acts is wanted else {"stiffness": getattr(acts, "pad", None)})}
+                for wanted, acts in zip(self.interactions, self.acting, strict=True)
+            ],
             "element": self.element,
             **({"stress": True} if self.stress else {}),
             **({} if self.fine is None else {"fine": [asdict(one) for one in self.fine]}),

@@ -35,6 +35,7 @@ interface Core {
   trust(): number;
   state(): number;
   step(dt: number): number;
+  release(dt: number): number;
   start(): void;
   touch(field: number): number;
 }
@@ -95,6 +96,14 @@ export class Evaluator {
   step(place: Vec3, parameters: ArrayLike<number>, dt: number): Answer {
     this.ask(place, parameters);
     return this.read(this.core.step(dt));
+  }
+
+  /** Let go for `dt` seconds of a body that lies elsewhere after a touch; the answer is that of the place where it then lies. */
+  release(place: Vec3, parameters: ArrayLike<number>, dt: number): Answer & { lies: Vec3 } {
+    this.ask(place, parameters);
+    const flags = this.core.release(dt);
+    const [x, y, z] = this.numbers(this.core.asked(), 3);
+    return { ...this.read(flags), lies: [x!, y!, z!] };
   }
 
   /** Standard deviation of the force relative to its size; not-a-number where it is unknown. */

@@ -12,8 +12,10 @@ import type { Places } from "./indentation_drawing";
 import type { Hello } from "./messages";
 import { Binding, PackedSurface } from "./packed";
 import type { BindingFacts, FieldFacts, SurfaceFacts } from "./packed";
+import { MovingRest } from "./moving_rest";
 import { provide } from "./resources";
 import { touch } from "./touch";
+import { element } from "./units";
 
 interface Facts {
   places: Places | null; // where indentations stay
@@ -73,13 +75,21 @@ async function open(): Promise<void> {
   const evaluator = await Evaluator.of(module, blocks.map(words), facts.places?.points.length, nodes && words(nodes));
   const kept = facts.places && new IndentationDrawing(evaluator, hello, surface!, facts.places);
   const line = facts.line && new LineShape(evaluator, facts.line, hello.line!.rest.length);
+  const rest = facts.line?.stays ? new MovingRest(evaluator, facts.line.directions[0]!) : null;
+  if (rest) offerStraightening(rest);
   const curve = new DepthCurve(hello, evaluator);
   touch({
-    connect: (listener) => new FileConnection(listener, hello, evaluator, kept, line),
+    connect: (listener) => new FileConnection(listener, hello, evaluator, kept, line, rest),
     seen: (frame) => curve.update(frame),
   });
   // for programs that drive the page, and for whoever wants to ask the body
-  Object.assign(window, { palpate: { hello, evaluator, surface, fields, kept, line } });
+  Object.assign(window, { palpate: { hello, evaluator, surface, fields, kept, line, rest } });
+}
+
+function offerStraightening(rest: MovingRest): void {
+  const button = element("straighten");
+  button.hidden = false;
+  button.addEventListener("click", () => rest.straighten());
 }
 
 document.documentElement.dataset["file"] = "";

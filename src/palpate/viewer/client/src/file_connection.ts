@@ -9,6 +9,7 @@ import type { Answer, Evaluator } from "./evaluator";
 import type { IndentationDrawing } from "./indentation_drawing";
 import type { LineShape } from "./line_shape";
 import { Hold, Loop } from "./messages";
+import type { MovingRest } from "./moving_rest";
 import type { Frame, Hand, Hello, Vec3 } from "./messages";
 
 const STEP = 0.002; // s
@@ -38,6 +39,7 @@ export class FileConnection {
     private readonly evaluator: Evaluator,
     private readonly kept: IndentationDrawing | null,
     private readonly line: LineShape | null = null,
+    private readonly rest: MovingRest | null = null,
   ) {
     this.place = [...hello.centre];
     this.parameters = Float32Array.from(hello.parameters, ({ low, high }) => (low + high) / 2);
@@ -48,6 +50,8 @@ export class FileConnection {
   }
 
   send(hand: Hand): void {
+    // at once: until the next picture the hand may have gone on
+    if (hand.grabbed && !this.hand?.grabbed) this.rest?.take(this.moved(hand.target));
     this.hand = hand;
   }
 
@@ -73,31 +77,50 @@ export class FileConnection {
     if (hand?.parameters.length) this.parameters = Float32Array.from(hand.parameters);
     const held = hand !== null && hand.grabbed && !hand.hidden && !this.stopped;
     if (held) this.follow(this.wanted(hand.target), elapsed);
+    else if (this.rest) this.lieFree(this.rest, elapsed);
     else if (this.answer) this.letGo(now);
     return this.frame(now / 1000, held);
   }
 
   /** Where the hand wants the probe's centre, or what it holds, m. */
   private wanted(target: Vec3): Vec3 {
-    const [x, y, z] = target.map((v) => v * this.hello.scale) as Vec3;
-    const moved: Vec3 = this.line ? [x, y, z] : [x, -z, y]; // a device's y is up, as a line's; a solid's z
+    const moved = this.moved(target);
+    if (this.rest) return this.rest.lead(moved);
     return this.hello.holds ? moved : (moved.map((v, k) => v + this.hello.centre[k]!) as Vec3);
   }
 
+  /** The hand's place in the axes of the body, from the device's centre, m. */
+  private moved(target: Vec3): Vec3 {
+    const [x, y, z] = target.map((v) => v * this.hello.scale) as Vec3;
+    return this.line ? [x, y, z] : [x, -z, y]; // a device's y is up, as a line's; a solid's z
+  }
+
   private follow(to: Vec3, elapsed: number): void {
-    const from = this.answer ? this.place : to; // the hand has just taken hold
-    // a body that remembers nothing hears of the last place alone
-    const count = this.hello.remembers ? Math.max(1, Math.ceil(elapsed / STEP)) : 1;
+    const from = this.rest?.place ?? (this.answer ? this.place : to); // the hand has just taken hold
+    const count = this.steps(elapsed);
     for (let k = 1; k <= count; k++) {
       const between = to.map((v, i) => from[i]! + ((v - from[i]!) * k) / count) as Vec3;
       this.answer = this.evaluator.step(between, this.parameters, elapsed / count);
     }
     this.place = to;
+    this.rest?.led(to);
     const size = Math.hypot(...this.answer!.force);
     this.clamped = size > this.hello.max_force;
     const share = this.clamped ? this.hello.max_force / size : 1;
     const free = (this.answer!.flags & TOO_DEEP) !== 0; // the body has let go
     this.force = Number.isFinite(size) && !free ? (this.answer!.force.map((v) => v * share) as Vec3) : NOWHERE;
+  }
+
+  /** Into how many steps the time between two pictures is divided: a body that remembers nothing hears of the last place alone. */
+  private steps(elapsed: number): number {
+    return this.hello.remembers || this.rest ? Math.max(1, Math.ceil(elapsed / STEP)) : 1;
+  }
+
+  private lieFree(rest: MovingRest, elapsed: number): void {
+    const count = this.steps(elapsed);
+    this.answer = rest.free(this.parameters, elapsed / count, count);
+    this.place = rest.place;
+    this.force = NOWHERE;
   }
 
   private letGo(now: number): void {
@@ -174,8 +197,8 @@ export class FileConnection {
       contact: touched ? touched.contact : this.line ? this.nodeAt(displacement) : hello.holds ? hello.centre : NOWHERE,
       normal: touched ? touched.normal : NOWHERE,
       depth: answer ? answer.depth : 0,
-      stiffness: answer && contact ? along(answer) : 0,
-      deviation: contact ? evaluator.deviation(this.place, this.parameters) : 0,
+      stiffness: held && answer && contact ? along(answer) : 0,
+      deviation: held && contact ? evaluator.deviation(this.place, this.parameters) : 0,
       drawn: touched ? touched.depth : 0,
       displacement,
       coefficients,

@@ -1,7 +1,7 @@
 // How far solves and learning are: phase, time left, error against unseen solves, target; and the wish that they end.
 
 import type { LearningProgress } from "./messages";
-import { element, share, tidy } from "./units";
+import { element, share, square, tidy } from "./units";
 
 const TOAST = 6000; // ms that an improvement is shown on the picture
 
@@ -28,7 +28,17 @@ export class Learning {
     element("error").classList.toggle("unknown", news.error_p95 === null);
     element("report-link").hidden = !news.report;
     this.errors();
+    this.areas();
     this.clock();
+  }
+
+  /** How much of what was to be touched is trained. */
+  private areas(): void {
+    const [painted, trained] = [this.latest?.painted_area ?? null, this.latest?.trained_area ?? null];
+    const line = element("trained-area");
+    line.hidden = painted === null || trained === null;
+    if (painted === null || trained === null) return;
+    line.textContent = `${square(trained)} of ${square(painted)} that were to be touched are trained`;
   }
 
   /** No more solves come. */

@@ -6,6 +6,7 @@ import type { Vec3 } from "./messages";
 
 /** What the page knows of a line: palpate/viewer/file_line.py. */
 export interface LineFacts {
+  stays: boolean; // it lies elsewhere after a touch
   directions: Vec3[]; // of the loads that the hand supplies
   touched: number[]; // which inputs these are
   further: number[]; // and which ones are further inputs

@@ -209,6 +209,8 @@ export interface LearningProgress {
   report: boolean;
   remaining: number | null;
   share: number;
+  painted_area: number | null;
+  trained_area: number | null;
 }
 
 export function isHello(message: { kind: string }): message is Hello & { kind: string } {

@@ -1,7 +1,18 @@
 // A part that is set up: its surface, what of it is held and touched, and how much of it a pick takes. What is held is seen through the
 // body, hatched, where it lies on the far side.
 
-import { BufferGeometry, DoubleSide, GreaterDepth, Mesh, MeshBasicMaterial, MeshLambertMaterial, MOUSE, Vector3 } from "three";
+import {
+  BufferGeometry,
+  DoubleSide,
+  GreaterDepth,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  MOUSE,
+  Vector3,
+} from "three";
 import { Role } from "./messages";
 import type { PartFaces, Surface, Vec3 } from "./messages";
 import { SurfaceView } from "./surface_view";
@@ -26,6 +37,7 @@ export class PartView extends SurfaceView {
   private readonly touched: Mesh<BufferGeometry, MeshLambertMaterial>;
   private readonly asked: Mesh<BufferGeometry, MeshLambertMaterial>; // what a click would take
   private readonly behind: Mesh<BufferGeometry, MeshBasicMaterial>; // what is held, on the far side
+  private readonly painted: LineSegments<BufferGeometry, LineBasicMaterial>; // of what will be touched
   private neighbours: Int32Array | null = null; // three of each triangle, -1 for none
 
   constructor(canvas: HTMLCanvasElement, surface: Surface, faces: PartFaces, words: readonly Element[]) {
@@ -45,7 +57,8 @@ export class PartView extends SurfaceView {
     this.behind = new Mesh(this.held.geometry, hatched());
     this.behind.frustumCulled = false;
     this.behind.renderOrder = 2; // after the surfaces, behind which it lies
-    this.scene.add(this.held, this.touched, this.asked, this.behind);
+    this.painted = this.border();
+    this.scene.add(this.held, this.touched, this.asked, this.behind, this.painted);
     this.probe.material.opacity = 0.35;
     this.recolour();
     this.refresh();
@@ -154,6 +167,7 @@ export class PartView extends SurfaceView {
     this.touched?.material.color.set(css("--accent"));
     this.asked?.material.color.set(css("--warn"));
     this.behind?.material.color.set(css("--accent-2"));
+    this.painted?.material.color.set(css("--ink"));
   }
 
   private refresh(): void {
@@ -164,6 +178,7 @@ export class PartView extends SurfaceView {
       this.pick(mesh, this.where((t) => this.roles[t] === role));
     }
     this.pick(this.asked, []);
+    this.painted.geometry.setIndex(this.edges(Role.TOUCHED));
     this.behind.visible = this.held.visible;
     this.dirty = true;
   }
@@ -184,6 +199,30 @@ export class PartView extends SurfaceView {
     const mesh = new Mesh(geometry, material);
     mesh.frustumCulled = false;
     return mesh;
+  }
+
+  /** The line around what has a role, on the part's own points. */
+  private border(): LineSegments<BufferGeometry, LineBasicMaterial> {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", this.geometry.getAttribute("position"));
+    const lines = new LineSegments(geometry, new LineBasicMaterial());
+    lines.frustumCulled = false;
+    lines.renderOrder = 1; // over the skins, on whose edges it lies
+    return lines;
+  }
+
+  /** Pairs of points: the edges between triangles with a role and others. */
+  private edges(role: number): number[] {
+    const { triangles } = this.surface;
+    const next = (this.neighbours ??= this.adjacent());
+    const pairs: number[] = [];
+    for (let i = 0; i < triangles.length; i++) {
+      if (this.roles[Math.floor(i / 3)] !== role) continue;
+      const other = next[i]!;
+      if (other >= 0 && this.roles[other] === role) continue;
+      pairs.push(triangles[i]!, triangles[i % 3 === 2 ? i - 2 : i + 1]!);
+    }
+    return pairs;
   }
 
   private measure(): void {

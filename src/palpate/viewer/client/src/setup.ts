@@ -8,7 +8,7 @@ import type { Answer, PartFacts, StartWish } from "./messages";
 import { PartForm } from "./part_form";
 import type { PartView, Pointed } from "./part_view";
 import { PickHistory } from "./pick_history";
-import { element, input, tidy, worded } from "./units";
+import { element, input, square, tidy, worded } from "./units";
 
 const CLICK = 5; // px that a pointer may move and still click
 const LISTED = 60; // faces in the list
@@ -327,9 +327,4 @@ export class Setup {
   private paint(at: Pointed): void {
     if (this.role !== null) this.view.assign(this.view.near(at, this.spreads.brush), this.role);
   }
-}
-
-/** An area as a person reads it. */
-function square(area: number): string {
-  return area >= 1e-4 ? `${tidy(1e4 * area)} cm²` : `${tidy(1e6 * area)} mm²`;
 }

@@ -46,6 +46,11 @@ function scientific(x: number, digits: number): string {
   return minus(`${mantissa}\u00a0×\u00a010${raised}`);
 }
 
+/** An area as a person reads it. */
+export function square(area: number): string {
+  return area >= 1e-4 ? `${tidy(1e4 * area)} cm²` : `${tidy(1e6 * area)} mm²`;
+}
+
 /** `palpate.format.share`: a ratio in per cent. */
 export function share(x: number): string {
   return `${tidy(100 * x, 2)}\u00a0%`;

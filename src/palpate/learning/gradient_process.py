@@ -105,41 +105,48 @@ class GradientProcess:
     noise: float  # τ
 
     @cached_property
-    def _known(self) -> np.ndarray:
+    def rows(self) -> np.ndarray:
+        """Indices of the targets that are known, in all of them one after another."""
         return np.flatnonzero(self.seen.weights.ravel() > 0)
 
     @cached_property
     def _factor(self) -> np.ndarray:
         X, size = self.seen.X, self.seen.targets.size
-        K = covariance(X, X, self.lengths, self.images).reshape(size, size)[np.ix_(self._known, self._known)]
-        K[np.diag_indices(len(K))] += self.noise**2 / self.seen.weights.ravel()[self._known]
+        K = covariance(X, X, self.lengths, self.images).reshape(size, size)[np.ix_(self.rows, self.rows)]
+        K[np.diag_indices(len(K))] += self.noise**2 / self.seen.weights.ravel()[self.rows]
         return np.asarray(cholesky(K, lower=True, check_finite=False))
 
     @cached_property
-    def _solution(self) -> np.ndarray:
-        return np.asarray(cho_solve((self._factor, True), self.seen.targets.ravel()[self._known]))
+    def solution(self) -> np.ndarray:
+        """The known targets times the inverse of their covariance, in units of σ²."""
+        return np.asarray(cho_solve((self._factor, True), self.seen.targets.ravel()[self.rows]))
+
+    @property
+    def inverse(self) -> np.ndarray:
+        """Inverse of the covariance of the known targets, in units of σ²."""
+        return np.asarray(cho_solve((self._factor, True), np.eye(len(self._factor))))
 
     @cached_property
     def variance(self) -> float:
         """σ²: the scale of the covariance that makes the observations most likely."""
-        return float(self.seen.targets.ravel()[self._known] @ self._solution) / len(self._known)
+        return float(self.seen.targets.ravel()[self.rows] @ self.solution) / len(self.rows)
 
     @cached_property
     def misfit(self) -> float:
         """Negative logarithm of the marginal likelihood at that scale, less a constant."""
-        return float(0.5 * len(self._known) * np.log(self.variance) + np.log(np.diagonal(self._factor)).sum())
+        return float(0.5 * len(self.rows) * np.log(self.variance) + np.log(np.diagonal(self._factor)).sum())
 
     def predict(self, X: np.ndarray) -> np.ndarray:
         """Return the expected value and slopes (P, 1 + n) at scaled inputs X (P, n)."""
         shape = (len(X), 1 + X.shape[1])
         prior = covariance(X, self.seen.X, self.lengths, self.images).reshape(X.size + len(X), -1)
-        return np.asarray(prior[:, self._known] @ self._solution).reshape(shape)
+        return np.asarray(prior[:, self.rows] @ self.solution).reshape(shape)
 
     def posterior(self, X: np.ndarray) -> np.ndarray:
         """Return the covariance (P(1 + n), P(1 + n)) of value and slopes at X (P, n), place by place."""
         size = X.size + len(X)
         prior = covariance(X, X, self.lengths, self.images).reshape(size, size)
-        with_seen = covariance(self.seen.X, X, self.lengths, self.images).reshape(-1, size)[self._known]
+        with_seen = covariance(self.seen.X, X, self.lengths, self.images).reshape(-1, size)[self.rows]
         half = np.linalg.solve(self._factor, with_seen)
         return np.asarray(self.variance * (prior - half.T @ half))
 

@@ -1,0 +1,46 @@
+"""A rigid ball on the axis of a cylinder, beside an axisymmetric solve of the same cylinder that shares no code."""
+
+from __future__ import annotations
+
+import axisymmetric_ball
+import numpy as np
+import pytest
+
+from palpate.errors import UsageError
+from palpate.physics.interactions import SphereProbe
+from palpate.physics.interactions.rigid_limit import rigid_pad
+from palpate.physics.materials import NeoHookean
+from palpate.physics.shapes import Block, Cylinder
+from palpate.physics.solid import Body
+
+YOUNG, POISSON, RADIUS, SIZE = 9e3, 0.45, 0.010, 0.030
+DEPTHS = (0.003, 0.005)
+
+
+@pytest.mark.full
+@pytest.mark.timeout(240)
+def test_a_rigid_ball_feels_the_force_of_an_axisymmetric_solve() -> None:
+    """Within 1 % where the contact's radius is more than an element."""
+    gel = NeoHookean(YOUNG, POISSON)
+    probe = SphereProbe(RADIUS, pad="rigid", depth=(3e-4, 0.006), over=((-1e-3, -1e-3), (1e-3, 1e-3)))
+    solver = Body(Cylinder(SIZE, SIZE), gel, fixed="bottom").problem(probe).open()
+    found = [solver.solve((0.0, 0.0, SIZE + RADIUS - depth)) for depth in DEPTHS]
+    assert all(solution.converged for solution in found)
+    wanted = axisymmetric_ball.forces(YOUNG, POISSON, RADIUS, SIZE, SIZE, [0.001, *DEPTHS])[1:]
+    np.testing.assert_allclose([solution.response[2] for solution in found], wanted, rtol=0.01)
+
+
+def test_the_pad_of_a_rigid_ball_follows_from_the_body() -> None:
+    """By the pressure of Hertz it yields 0.6 % of half the largest depth; it is in series, so it goes with E*."""
+    probe = SphereProbe(RADIUS, pad="rigid", depth=(0.0, 0.008))
+    gel = NeoHookean(YOUNG, POISSON)
+    pad = rigid_pad(probe, {"body": gel})
+    modulus, contact = YOUNG / (1 - POISSON**2), np.sqrt(RADIUS * 0.004)
+    pressure = 4 / (3 * np.pi) * modulus * contact / RADIUS
+    assert pressure / pad / 0.004 == pytest.approx(0.0057, rel=0.02)
+    assert rigid_pad(probe, {"body": NeoHookean(2 * YOUNG, POISSON)}) == pytest.approx(2 * pad, rel=0.01)
+    problem = Body(Block((0.06, 0.06, 0.03)), gel).problem(probe)
+    assert problem.describe()["interactions"][0]["stiffness"] == pad
+    assert "rigid sphere" in str(probe)
+    with pytest.raises(UsageError, match="pad"):
+        SphereProbe(RADIUS, pad="stiff")

@@ -191,7 +191,7 @@ def learn(
 
     first = limit(1.0 / (1.0 + _FIELD_SHARE * len(fields)))
     searches = vars(options) | {"seconds": first} | dict(known.options)
-    energy, found = learn_energy(known.solves, known.baseline, **searches)
+    energy, found = learn_energy(known.solves, known.baseline, rivals=known.rivals, **searches)
     painted = None if known.region is None else known.region(energy)
     energy = energy if painted is None else replace(energy, region=painted.region)
     learnt: dict[str, LearntField] = {}

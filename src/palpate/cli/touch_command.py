@@ -69,10 +69,10 @@ def touch(
             why="There is no terminal, or --no-view or --json is given.",
             fix="Add --view, or leave --device out.",
         )
-    if not part.is_file():
+    file = study_file(part, choices.name)
+    if not part.is_file() and (is_shown or not file.exists()):
         raise UsageError(f"There is no file {part}.", fix=f"Name {PART_FORMATS}.")
     options = ImprovementOptions(until=until, limit=60 * minutes, workers=workers)
-    file = study_file(part, choices.name)
     with (
         hold_study(Paths(file.parent, file.stem), "palpate touch") as lock,
         _no_study_of_refusals(part, choices.name),

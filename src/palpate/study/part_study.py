@@ -117,7 +117,7 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
 
 
 def _element_size(wanted: str | None, footprint: float, radius: float) -> float:
-    """Return the size in m of elements under a ball: the one that is wanted, or by the footprint in m²."""
+    """Return the size in m of elements under a ball: the one that is wanted, or by the area in m² that the part covers."""
     if wanted is None or wanted == AUTO:
         return _nice(min(math.sqrt(footprint / CELLS), COARSE * radius))
     size = parse_quantity(wanted, "m", "--element", bare=False)

@@ -116,10 +116,10 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     return study, tuple(_notes(path, unit, faces, regions, low, high))
 
 
-def _element_size(wanted: str | None, footprint: float, radius: float) -> float:
-    """Return the size in m of elements under a ball: the one that is wanted, or by the area in m² that the part covers."""
+def _element_size(wanted: str | None, area: float, radius: float) -> float:
+    """Return the size in m of elements under a ball: the one that is wanted, or by the area in m² of the part's box."""
     if wanted is None or wanted == AUTO:
-        return _nice(min(math.sqrt(footprint / CELLS), COARSE * radius))
+        return _nice(min(math.sqrt(area / CELLS), COARSE * radius))
     size = parse_quantity(wanted, "m", "--element", bare=False)
     _require_fine_elements(size, radius, "The elements", "smaller elements")
     return size

@@ -91,6 +91,7 @@ class TouchedPart:
         self.until, self.limit, self.workers, self.console = until, limit, workers, console
         self.times: dict[str, float] = {}
         self.exit_code = 0  # of the work, once it has ended: 2 where it refused the study
+        self.refusal: UsageError | None = None  # then with its reason
         self._made = time.monotonic()
         self._progress = Progress("starting", target=until)
         self._estimate = WorkEstimate()
@@ -216,6 +217,7 @@ class TouchedPart:
         self.console.say(reached)
 
     def _fail(self, error: dict[str, str]) -> None:
+        self.refusal = UsageError(error["what"], why=error["why"], fix=error["fix"])
         words = " ".join(filter(None, (error["what"], error["why"], error["fix"])))
         self.page.end(words)
         self.console.say(words)
@@ -250,6 +252,7 @@ def touch_on_page(
     *,
     at_once: bool = False,
     on_ready: Callable[[PartPage], object] | None = None,
+    on_address: Callable[[str], object] = lambda _: None,
     **options: Any,
 ) -> None:
     """Open the page of a part, let a person choose, and work until Ctrl-C.
@@ -257,8 +260,8 @@ def touch_on_page(
     `study_of` gets a unit of the file's numbers, or None at first; it returns the study of the part, its file, and
     whether that was there before: then the work goes on at once, as with `at_once`, which begins with the first
     choices. `write` writes a chosen study and returns its file. `on_ready` is called once with the running page; by
-    default its address is printed, and opened in the user's browser where there is a terminal. The options are those of
-    `PartPage`.
+    default its address is printed, and opened in the user's browser where there is a terminal. `on_address` gets that
+    address. The options are those of `PartPage`.
     """
     from palpate.study.part_choices import chosen_study, shown_part
 
@@ -290,6 +293,7 @@ def touch_on_page(
 
     def ready(page: PartPage) -> None:
         touched.mark("page")
+        on_address(page.url)
         if on_ready is not None:
             on_ready(page)
         else:

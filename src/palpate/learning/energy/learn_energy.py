@@ -76,7 +76,11 @@ class EnergyHistory:
 
 @takes(EnergyOptions)
 def learn_energy(
-    solves: Solves, baseline: Baseline, *, options: EnergyOptions
+    solves: Solves,
+    baseline: Baseline,
+    *,
+    options: EnergyOptions,
+    on_step: Callable[[str], None] = lambda _: None,
 ) -> tuple[LearntEnergy, EnergyHistory]:
     """Learn the energy of a body from solves.
 
@@ -86,6 +90,8 @@ def learn_energy(
         Inputs, energies, forces and stiffnesses, and the body's symmetry.
     baseline : Baseline
         What of the energy is known beforehand.
+    on_step : callable
+        Told each step of the search that begins, in words; by default nobody is.
 
     Returns
     -------
@@ -108,7 +114,9 @@ def learn_energy(
         if options.choose and len(baseline.candidates()) > 1:
             part = budget.part(_CHOICE_SHARE)
             baseline, trials = _choose_baseline(baseline.candidates(), problem_of, part, options.seed)
-        ensemble, further = search_energy(problem_of(baseline), options=options, budget=budget)
+        ensemble, further = search_energy(
+            problem_of(baseline), options=options, budget=budget, on_step=on_step
+        )
         trust = trust_of(ensemble, samples)
         suspects = suspect_solves(samples, baseline, images)
     meta = training_meta(samples, ensemble, trust.errors)

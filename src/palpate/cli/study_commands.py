@@ -139,6 +139,7 @@ def learn_file(study: Path, console: Console, *, watch: bool = False, leave_out:
     in `leave_out` are not learnt from.
     """
     from palpate.cli.growth_view import watch_growth
+    from palpate.cli.learning_steps import LearningSteps
     from palpate.study import read_study
     from palpate.study.mesh_check import load_finer
     from palpate.study.run import Paths, learn_study, load_data, save_model, validate_study, with_validation
@@ -152,7 +153,7 @@ def learn_file(study: Path, console: Console, *, watch: bool = False, leave_out:
     with hold_study(paths, "palpate learn"):
         train, test = load_data(record, paths)
         console.say(f"Learning from {len(train)} {'solves' if record.memory is None else 'histories'} …")
-        with watch_growth(page, record.name, console) as recorder:
+        with watch_growth(page, record.name, console) as recorder, console.patience("Learning"):
             model, history = learn_study(
                 record,
                 train,
@@ -160,6 +161,7 @@ def learn_file(study: Path, console: Console, *, watch: bool = False, leave_out:
                 log=lambda stage: console.say(f"{stage} …"),
                 watch=recorder,
                 leave_out=leave_out,
+                on_step=LearningSteps(console).begin,
             )
         validation = validate_study(record, model, test, history, load_finer(record, paths))
         curve = earlier_curve(paths, record.name)
@@ -242,6 +244,7 @@ def learn_dataset_file(path: Path, effort: float, console: Console, leave_out: S
     The effort multiplies the counts of candidates and iterations of the searches. The rows numbered in `leave_out` are
     not learnt from.
     """
+    from palpate.cli.learning_steps import LearningSteps
     from palpate.dataset import Dataset
     from palpate.learning import learn_dataset
 
@@ -253,6 +256,7 @@ def learn_dataset_file(path: Path, effort: float, console: Console, leave_out: S
         effort=effort,
         leave_out=leave_out,
         log=lambda stage: console.say(f"{stage} …"),
+        on_step=LearningSteps(console).begin,
     )
     target = path.with_suffix(".palpate")
     model.save(target)

@@ -119,6 +119,7 @@ def learn(
     shape: bool = True,
     leave_out: Sequence[int] = (),
     log: Log = lambda _: None,
+    on_step: Log = lambda _: None,
     options: SearchOptions,
     **further: Any,
 ) -> tuple[Surrogate, LearningHistory]:
@@ -143,6 +144,8 @@ def learn(
         neighbours, for example.
     log : callable
         Told what begins, as one line.
+    on_step : callable
+        Told each step of the search for the energy that begins, in words.
     **further
         Options of `palpate.learning.energy.learn_energy`, such as ``units_max``, ``target`` and ``networks``. Of a
         pressed body also ``law``, a contact law that is taken as it is, ``length``, a guess of the depth at which pad
@@ -178,6 +181,8 @@ def learn(
     numbers, excluded = _kept_rows(train, leave_out)
     train, solves = train.take(numbers), len(numbers)
     origin = {"hash": train.ok.hash, "provenance": train.provenance}
+    if "input_node" in train:  # a body that loads bend
+        log(f"displacements of {count(solves, 'solve')}")
     known = recognise(train, Request(options, layout, further))
     if known is None:
         _refuse_options(further)
@@ -191,7 +196,8 @@ def learn(
 
     first = limit(1.0 / (1.0 + _FIELD_SHARE * len(fields)))
     searches = vars(options) | {"seconds": first} | dict(known.options)
-    energy, found = learn_energy(known.solves, known.baseline, rivals=known.rivals, **searches)
+    asked: dict[str, Any] = {"rivals": known.rivals, "on_step": on_step}
+    energy, found = learn_energy(known.solves, known.baseline, **asked, **searches)
     painted = None if known.region is None else known.region(energy)
     energy = energy if painted is None else replace(energy, region=painted.region)
     learnt: dict[str, LearntField] = {}

@@ -81,6 +81,7 @@ def learn_energy(
     baseline: Baseline,
     *,
     rivals: Callable[[], Sequence[Baseline]] | None = None,
+    on_step: Callable[[str], None] = lambda _: None,
     options: EnergyOptions,
 ) -> tuple[LearntEnergy, EnergyHistory]:
     """Learn the energy of a body from solves.
@@ -94,6 +95,8 @@ def learn_energy(
     rivals : callable, optional
         Gives other forms of it, one of which takes its place where solves that are left out are missed less by an
         affine factor alone. Asked only where the factor on `baseline` misses more than 2 %.
+    on_step : callable
+        Told each step of the search that begins, in words; by default nobody is.
 
     Returns
     -------
@@ -119,7 +122,8 @@ def learn_energy(
             part = budget.part(_CHOICE_SHARE)
             baseline, more = _choose_baseline(baseline.candidates(), problem_of, part, options.seed)
             trials = (*trials, *more)
-        ensemble, further = search_energy(problem_of(baseline), options=options, budget=budget)
+        problem = problem_of(baseline)
+        ensemble, further = search_energy(problem, options=options, budget=budget, on_step=on_step)
         trust = trust_of(ensemble, samples)
         suspects = suspect_solves(samples, baseline, images)
     meta = training_meta(samples, ensemble, trust.errors)

@@ -35,6 +35,7 @@ export class Panel {
   private flagged = "";
   private hello: Hello | null = null;
   private last = 0;
+  private error: number | null = null; // of the force over all places, at the 95th percentile
 
   recolour(): void {
     this.force.recolour();
@@ -81,6 +82,11 @@ export class Panel {
     ]);
   }
 
+  /** Take the force error over all places, relative, at the 95th percentile; null where it is not known. */
+  state(error: number | null): void {
+    this.error = error;
+  }
+
   /** Show how deep (m) the next press goes. */
   depth(depth: number): void {
     input("depth-wanted").valueAsNumber = depth;
@@ -119,6 +125,7 @@ export class Panel {
   lost(): void {
     for (const id of UNKNOWN) put(id, NaN, 0);
     element("trust").textContent = element("deviation").textContent = "–";
+    this.compare(false);
     delete document.documentElement.dataset["tick"];
     this.list([{ id: "lost", tone: "bad", words: "Disconnected: nothing is known of the body. Trying again." }]);
   }
@@ -136,7 +143,17 @@ export class Panel {
     put("stiffness", felt ? frame.stiffness : NaN, 0);
     element("trust").textContent = !felt ? "–" : frame.inside ? "inside" : "outside";
     element("deviation").textContent = deviation(frame, this.hello!);
+    this.compare(element("deviation").textContent.startsWith("±"));
     record(frame); // one frame, whole
+  }
+
+  /** Say beside the deviation at this place how it goes together with the error over all places. */
+  private compare(stated: boolean): void {
+    const note = element("deviation-note");
+    note.hidden = !stated || this.error === null;
+    if (this.error === null) return;
+    const words = `An estimate for this place. Over all places it is ${share(this.error)} at most, for 95 of 100 presses.`;
+    if (note.textContent !== words) note.textContent = words;
   }
 
   /** The list of flags; changed only when they change, since it is read aloud. */
@@ -236,7 +253,7 @@ function trained(ranges: readonly RangeInfo[]): HTMLElement[] {
 /** The deviation of the force, in words. */
 function deviation(frame: Frame, hello: Hello): string {
   if (!frame.grabbed || (!hello.holds && frame.depth <= 0)) return "–"; // no force, no deviation
-  return Number.isNaN(frame.deviation) ? "not known" : `± ${share(frame.deviation)}`;
+  return Number.isNaN(frame.deviation) || !frame.inside ? "not known" : `± ${share(frame.deviation)}`;
 }
 
 function put(id: string, value: number, decimals: number): void {

@@ -17,13 +17,14 @@ import {
 } from "./messages";
 import type { LearningProgress, PartFacts, PartNews, StartWish } from "./messages";
 import { PartView } from "./part_view";
+import { lose } from "./restart";
 import { Setup } from "./setup";
 import { mode, watch } from "./skeleton";
 import { touch } from "./touch";
 import type { Touched } from "./touch";
 import { element, tidy } from "./units";
 
-const GONE = "The server of this page has ended. Give the command again";
+const GONE = "The server of this page has ended. Give the command again, and open the new address that the terminal shows";
 const PIECE = 900; // triangles in a message: the server takes 4 kB
 const AGAIN = 1000; // ms until a lost connection is tried again
 
@@ -64,9 +65,8 @@ function served(on: boolean): void {
     element("banner").hidden = true;
     return;
   }
-  status("lost", "disconnected, trying again");
   const stays = news?.stage === "choosing" ? "what is chosen here stays while the page is open." : "it goes on where it stopped.";
-  say(`${GONE}: ${stays}`, "bad");
+  lose(`${GONE}: ${stays}`);
 }
 
 function send(message: string | ArrayBuffer): void {
@@ -80,6 +80,7 @@ function hear(message: { kind: string }): void {
   progress = message;
   learning.hear(message);
   element("model-line").textContent ||= message.phase;
+  touched?.state(message.error_p95);
   if (touched) touched.mark(message.places);
   else view?.mark(message.places);
 }
@@ -174,6 +175,7 @@ function joinTouch(): Touched {
   };
   const joined = touch({ connect: joinServer, renewed });
   if (progress) joined.mark(progress.places);
+  joined.state(progress?.error_p95 ?? null);
   return joined;
 }
 

@@ -10,6 +10,7 @@ import type { Frame, Hello, Vec3 } from "./messages";
 import { Panel } from "./panel";
 import { Drops, feel } from "./reason";
 import { Recorder } from "./recorder";
+import { lose } from "./restart";
 import { mode, watch } from "./skeleton";
 import { element, fixed, worded } from "./units";
 
@@ -22,6 +23,8 @@ const canvas = element<HTMLCanvasElement>("view");
 export interface Touched {
   /** Draw dots where solves are done, m. */
   mark(places: readonly Vec3[]): void;
+  /** Take the force error over all places, relative, at the 95th percentile; null where it is not known. */
+  state(error: number | null): void;
   /** Version of the body that is drawn; 0 before the first picture. */
   readonly version: number;
 }
@@ -133,8 +136,7 @@ export function touch({ connect, renewed = () => {}, seen = () => {} }: Joint): 
     drops.lost();
     recorder.lost();
     element("arrow-label").hidden = true;
-    status("lost", "disconnected, trying again");
-    say("Disconnected from palpate. This page connects again as soon as the server is back.", "bad");
+    lose("Disconnected from palpate. If it was ended, start it again, and open the new address that its terminal shows.");
   }
 
   /** End the force: let go of what this page holds, stop what any other hand does. */
@@ -196,6 +198,7 @@ export function touch({ connect, renewed = () => {}, seen = () => {} }: Joint): 
       places = news;
       body?.mark?.(places);
     },
+    state: (error) => panel.state(error),
     get version() {
       return drawable;
     },

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -287,6 +288,11 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
     assert page.inner_text("#phase") == "2 of 12 first solves"
     assert re.fullmatch(r", about (50|45|40|35|30) s", page.inner_text("#remaining"))
     assert 0.25 <= page.evaluate("document.getElementById('work-share').value") < 0.9
+    assert page.inner_text("#pressable").startswith("It can't be pressed yet.")
+    assert page.get_attribute("#pressable", "role") == "status", "it is read aloud when it changes"
+    page.wait_for_selector("#part-view[data-camera]")
+    page.wait_for_timeout(500)  # until the room above the part is drawn
+    stood = page.get_attribute("#part-view", "data-camera")
     assert page.is_hidden("#error-median"), "nothing is said of an error before there is one"
     keep(page, "part-solving")
     report = tmp_path / "slab.html"
@@ -296,6 +302,8 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
     server.show_progress(first)
     page.wait_for_selector("html[data-touching='1'][data-tick][data-middle]")
     page.wait_for_selector("#error-p95:text-is('3.1')")
+    assert page.inner_text("#pressable").startswith("You can press it now.")
+    assert page.get_attribute("#view", "data-camera") == stood, "the view stays when the part can be touched"
     assert 41 <= int(page.inner_text("#elapsed").split()[0]) < 60
     page.wait_for_function("document.getElementById('remaining').textContent === ', a little longer'")
 
@@ -322,6 +330,10 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
     assert "Over all places it is 3.1\N{NO-BREAK SPACE}% at most" in page.inner_text("#deviation-note")
 
     server.show_body(versions[1])
+    before = "3.1 % before; the new one is being checked"
+    server.show_progress(dataclasses.replace(first, error_p95=math.nan, solves=24, trial=before))
+    page.wait_for_selector(f"#improved:text-is('{before}')")
+    assert page.is_hidden("#deviation-note"), "the new one is not checked yet"
     server.show_progress(dataclasses.replace(first, error_p95=0.028, solves=24))
     page.wait_for_selector("#error-p95:text-is('2.8')")
     assert page.inner_text("#improved") == "", "other solves judge the same body"

@@ -177,7 +177,7 @@ def learn(
     origin = {"hash": train.ok.hash, "provenance": train.provenance}
     numbers, excluded = _kept_rows(train, leave_out)
     train, solves = train.take(numbers), len(numbers)
-    log(f"energy of {count(solves, 'solve')}")
+    log(f"learning the energy of {count(solves, 'solve')}")
     known = _recognise(train, layout, options, further)
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
 
@@ -193,7 +193,7 @@ def learn(
     learnt: dict[str, LearntField] = {}
     for i, shown in enumerate(fields):
         assert known.learn_field is not None
-        log("shape" if shown == "displacement" else "stress")
+        log("learning the shape" if shown == "displacement" else "learning the stress")
         searches = vars(options) | {"seconds": limit(1.0 / (len(fields) - i))}
         learnt[shown] = known.learn_field(FieldOptions(name=shown, unit=_SHOWN[shown][1], **searches))
     # a region by the paint does not remember where it was solved; a validation asks for it

@@ -13,6 +13,7 @@ import { Recorder } from "./recorder";
 import { lose } from "./restart";
 import { mode, watch } from "./skeleton";
 import { element, fixed, worded } from "./units";
+import type { View } from "./view";
 
 const SILENT = 1500; // ms without a picture until the page says so
 const SAME = 1e-9; // what differs by less is drawn alike
@@ -35,12 +36,14 @@ export interface Joint {
   renewed?(version: number): void;
   /** Join whoever answers: the server, or the page itself. */
   connect(listener: Listener): Link;
+  /** The view in whose place the body's comes, to look from the same place. */
+  before?(): View | null;
   /** Hears of each picture. */
   seen?(frame: Frame): void;
 }
 
 /** Show a touched body. */
-export function touch({ connect, renewed = () => {}, seen = () => {} }: Joint): Touched {
+export function touch({ connect, renewed = () => {}, before = () => null, seen = () => {} }: Joint): Touched {
   const panel = new Panel();
   let hello: Hello | null = null;
   let body: Body | null = null;
@@ -94,7 +97,9 @@ export function touch({ connect, renewed = () => {}, seen = () => {} }: Joint): 
     body = bodyOf(news, canvas, connection, panel);
     await body.open(); // without WebGL this fails, and the numbers are still shown
     notes();
-    body.view!.look(); // now that the words stand where they will
+    const part = before();
+    if (part) body.view!.stand(part);
+    else body.view!.look(); // now that the words stand where they will
     body.mark?.(places);
     if (latest) show(latest);
     drawable = news.version;

@@ -11,6 +11,7 @@ import { element, fixed, input, interval, measured, rangeUnit, round125, share, 
 
 const EVERY = 80; // ms between changes of the numbers: faster can't be read
 const AT_FIRST = 0.5; // of the deepest trained depth, how deep a press goes
+const SAME = 1e-6; // of a range, by which its ends may differ and still be as far
 const MOST = 1.25; // so that it can be seen what lies outside
 const NUMBERS = ["force-norm", "force-x", "force-y", "force-z", "tip-x", "tip-y", "tip-z", "tip-norm"];
 const UNKNOWN = [...NUMBERS, "depth", "stiffness", "rate", "picture-rate"];
@@ -239,7 +240,9 @@ function trained(ranges: readonly RangeInfo[]): HTMLElement[] {
   const groups = new Map<string, string[]>();
   for (const { words, low, high, unit } of ranges) {
     const [, stem, axis] = /^(.* along )([xyz])$/.exec(words) ?? ["", words, ""];
-    const key = `${stem}\t${interval(low, high, unit)}`;
+    // as far to both sides: also where a mirrored body was loaded to one side alone
+    const both = low < 0 && Math.abs(low + high) < SAME * high;
+    const key = `${stem}\t${both ? `up to ${measured(high, unit)} either way` : interval(low, high, unit)}`;
     groups.set(key, [...(groups.get(key) ?? []), axis!]);
   }
   return [...groups].map(([key, axes]) => {

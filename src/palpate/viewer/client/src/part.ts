@@ -107,7 +107,7 @@ function isOther(message: PartNews, before: PartNews): boolean {
 
 /** Show the part with all that can be chosen. */
 function choose(): void {
-  status("live", "set it up");
+  status("connecting", "not started yet");
   loading ??= open();
   loading
     .then((facts) => {

@@ -27,6 +27,14 @@ from palpate.study.material_records import (
     SolidMaterialRecord,
 )
 from palpate.study.part_records import PartSurfaceRecord
+from palpate.study.solver_study import (
+    SolverInputRecord,
+    SolverRecord,
+    SolverStudy,
+    SolverSweepRecord,
+    SolverTestRecord,
+    UMBridgeRecord,
+)
 from palpate.study.stage_records import SECTIONS, RuntimeRecord
 
 PAGE = Path(__file__).parent / "guide" / "study-file.md"
@@ -67,6 +75,15 @@ def _tables() -> Iterator[str]:
             if name == "filter":
                 yield from _settings()
     yield from _table("`[runtime]`", RuntimeRecord, _purpose(RuntimeRecord))
+    yield from _table("Top level, with `[solver]`", SolverStudy, _purpose(SolverStudy))
+    for title, record in (
+        ("`[solver]`", SolverRecord),
+        ("`[solver]` with `url`", UMBridgeRecord),
+        ("`[[inputs]]` with `[solver]`, once per input", SolverInputRecord),
+        ("`[sweep]` with `[solver]`", SolverSweepRecord),
+        ("`[test]` with `[solver]`", SolverTestRecord),
+    ):
+        yield from _table(title, record, _purpose(record))
 
 
 def _kind_of(table: str, record: type[BaseModel]) -> Iterator[str]:
@@ -132,7 +149,7 @@ def _kind(schema: dict[str, Any], unit: str) -> str:
         "array": "list",
     }
     if many and "string" not in kinds:
-        return "list of numbers"
+        return f"list of {_entries(schema)}"
     if "anyOf" in schema:
         kinds = [
             words.get(part.get("type", ""), "") for part in schema["anyOf"] if part.get("type") != "null"
@@ -140,6 +157,14 @@ def _kind(schema: dict[str, Any], unit: str) -> str:
         inner = [f"≥ {part['minimum']:g}" for part in schema["anyOf"] if "minimum" in part]
         return ", ".join([" or ".join(k if k else "table" for k in kinds), *inner])
     return ", ".join([words.get(schema.get("type", ""), ""), *bounds])
+
+
+def _entries(schema: dict[str, Any]) -> str:
+    """What a list holds: numbers, texts, or quantities, which are numbers or texts."""
+    texts = [part for part in (schema.get("items", {}), *schema.get("prefixItems", ())) if part]
+    if any(part.get("type") == "string" for part in texts):
+        return "texts"
+    return "quantities" if any({"type": "string"} in part.get("anyOf", ()) for part in texts) else "numbers"
 
 
 def _shown(value: Any) -> str:

@@ -246,7 +246,6 @@ def closed_form(**problem) -> Dataset:
 @pytest.mark.parametrize(
     ("problem", "words"),
     [
-        ({"interactions": []}, "of no kind that can be learnt"),
         ({"body": {"gravity": [0, 0, -9.81]}}, "constant loads"),
         ({"body": {"material": {"body": {"type": "Plastic"}}}}, "yields"),
     ],

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from palpate.errors import UsageError
 from palpate.learning.painted_region import DEVIATION, MOST, SLACK, cover, painted_region
 from palpate.surrogates.model_card import card_of
-from pressed import DEEPEST, RADIUS, surrogate
+from palpate.validation import validate
+from pressed import DEEPEST, RADIUS, places, solves, surrogate
 
 PAINT = 0.015  # half the side of the painted square, m
 
@@ -63,6 +65,7 @@ def test_the_paint_is_trained_and_its_surroundings_are_not():
     assert len(painted.region.points) <= MOST
 
 
+@pytest.mark.full
 def test_where_the_force_is_not_known_nothing_is_trained():
     energy = energy_of(0.12)
     painted = painted_region(energy, PAINTED, AROUND, radius=RADIUS, deepest=DEEPEST)
@@ -97,3 +100,14 @@ def test_the_card_says_how_much_of_the_paint_is_trained():
     assert card.as_dict()["trained_on"]["trained_area"] == 53e-4
     assert any("54 cm²" in sentence and "53 cm²" in sentence for sentence in card.limits)
     assert "m²" in card.to_markdown()
+
+
+@pytest.mark.full
+def test_solves_that_were_learnt_from_judge_nothing():
+    """A region by the paint is no list of solves: the record has them."""
+    X = places(40)
+    region = painted_region(energy_of(0.0), PAINTED, AROUND, radius=RADIUS, deepest=DEEPEST).region
+    learnt = surrogate(region=region, meta={"solved_at": X[:30].tolist()})
+    assert validate(learnt, solves(X)).samples == 10
+    with pytest.raises(UsageError, match="trained on all 30"):
+        validate(learnt, solves(X[:30]))

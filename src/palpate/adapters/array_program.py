@@ -67,7 +67,7 @@ def program_of(body: Surrogate, dtype: type[np.floating]) -> dict[str, ArrayProg
             fix="Take the body without: body.with_memory(None).",
         )
     graph = Graph(dtype)
-    add_body(graph, body.energy, apart=True)
+    add_body(graph, body.hand_energy, apart=True)
     names = [node.result for node in graph.nodes if node.kind == "Identity"]
     return {name: _needed(graph, name, len(body.inputs)) for name in names}
 

@@ -64,7 +64,7 @@ class _Place:
     """One thread's evaluator and scratch: nothing is shared between threads."""
 
     def __init__(self, contact: SoftContact) -> None:
-        self.evaluator: EnergyEvaluator = contact.body.energy.evaluator()
+        self.evaluator: EnergyEvaluator = contact.body.hand_energy.evaluator()
         self.jacobian, self.solved = np.zeros((3, contact.model.nv)), np.zeros((3, contact.model.nv))
         self.other, self.turn = np.zeros((3, contact.model.nv)), np.zeros((3, contact.model.nv))
         self.answer = _Answer()
@@ -388,7 +388,7 @@ def _sensor_of(mujoco: Any, model: Any, name: str) -> tuple[int, int]:
 
 def _parameters(body: Surrogate, model: Any, tool: int, name: str, parameters: Sequence[float]) -> np.ndarray:
     """Return the further inputs (p,), the tool's radius among them, after the tool was held against what was learnt."""
-    baseline, felt = body.energy.baseline, len(body.energy.baseline.directions)
+    baseline, felt = body.hand_energy.baseline, len(body.hand_energy.baseline.directions)
     values = [float(v) for v in parameters]
     own = None if baseline.radius_input is None else baseline.radius_input - felt
     radius = float(model.geom_size[tool, 0])
@@ -408,7 +408,7 @@ def _parameters(body: Surrogate, model: Any, tool: int, name: str, parameters: S
 
 def _check_ball(body: Surrogate, model: Any, tool: int, name: str) -> None:
     """Refuse a tool that is no ball, or of another radius than was learnt."""
-    baseline, radius = body.energy.baseline, float(model.geom_size[tool, 0])
+    baseline, radius = body.hand_energy.baseline, float(model.geom_size[tool, 0])
     if int(model.geom_type[tool]) != int(import_extra("mujoco", "mujoco").mjtGeom.mjGEOM_SPHERE):
         raise UsageError(
             f"The tool {name!r} is no sphere.",

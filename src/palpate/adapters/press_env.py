@@ -70,7 +70,7 @@ class PressEnv(_gymnasium.Env):  # type: ignore[misc]
             raise UsageError(
                 f"A tool's mass must be positive, not {mass} kg.", fix=f"Give {_MASS}, for example."
             )
-        energy, middle = learnt.energy, [(r.low + r.high) / 2.0 for r in learnt.parameters]
+        energy, middle = learnt.hand_energy, [(r.low + r.high) / 2.0 for r in learnt.parameters]
         self._parameters = np.asarray(middle if parameters is None else parameters, dtype=np.float64)
         if self._parameters.shape != (len(middle),) or not np.isfinite(self._parameters).all():
             names = ", ".join(r.name for r in learnt.parameters) or "none"

@@ -1,10 +1,10 @@
-"""Answer of a model at one place, for a person and for a program: of an energy, or of networks of arrays."""
+"""Answer of a model at one place, for a person and for a program: of an energy, or of numbers and fields."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,19 @@ import numpy as np
 from palpate.format import share
 from palpate.learning import Fitted
 from palpate.network import Network
+from palpate.surrogates import ModalField, Surrogate
 from palpate.units import Quantity, Range, bounds
 
-__all__ = ["Answer", "Deflection", "Prediction", "outside", "predictions"]
+__all__ = [
+    "Answer",
+    "Answers",
+    "Deflection",
+    "FieldSummary",
+    "Prediction",
+    "outside",
+    "predictions",
+    "surrogate_answers",
+]
 
 _NOTHING = 1e-9  # N: first touch, but for round-off
 
@@ -109,7 +119,7 @@ class Prediction:
     def words(self, names: Sequence[Range]) -> str:
         """Return the answer as lines for a person."""
         lines = [_place_in_words(self.inputs, names)]
-        width = max(len(output.name) for output in self.outputs)
+        width = max((len(output.name) for output in self.outputs), default=0)
         sure = [None] * len(self.values) if self.deviations is None else self.deviations
         for output, value, deviation in zip(self.outputs, self.values, sure, strict=True):
             spread = "" if deviation is None or math.isnan(deviation) else f" ± {deviation:.2g}"
@@ -125,6 +135,70 @@ class Prediction:
             "inside": self.inside,
             "beyond": _names_beyond(self.inputs, names),
         }
+
+
+@dataclass(frozen=True)
+class FieldSummary:
+    """The least, largest and mean value of a field or curve at one place of the inputs."""
+
+    name: str
+    unit: str
+    least: float
+    largest: float
+    mean: float
+    deviations: tuple[float, float]  # of the least and the largest, not-a-number where they are unknown
+    places: tuple[str, str]  # where the least and the largest are, in words
+    components: bool  # whether these are sizes of vectors
+
+    @classmethod
+    def of(cls, field: ModalField, x: np.ndarray) -> FieldSummary:
+        """Return the summary of a field at inputs x (n,); of a vector field that of its size."""
+        values, spread = field.values(x[None])[0], field.deviation(x[None])[0]
+        size = values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
+        sure = np.linalg.norm(spread, axis=1)
+        low, high = int(size.argmin()), int(size.argmax())
+        return cls(
+            field.name,
+            field.unit,
+            *(float(size[low]), float(size[high]), float(size.mean())),
+            (float(sure[low]), float(sure[high])),
+            (field.places.in_words(low), field.places.in_words(high)),
+            values.shape[1] > 1,
+        )
+
+    def words(self) -> str:
+        """Return the summary as a line for a person."""
+
+        def one(value: float, deviation: float, where: str) -> str:
+            spread = "" if math.isnan(deviation) else f" ± {deviation:.2g}"
+            return f"{value:.6g}{spread} {self.unit}".rstrip() + f" {where}"
+
+        ends = zip((self.least, self.largest), self.deviations, self.places, strict=True)
+        least, largest = (one(*end) for end in ends)
+        size = " (size)" * self.components
+        return f"  {self.name}{size}: {least} to {largest}, mean {self.mean:.6g} {self.unit}".rstrip()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the summary as data for a program."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Numbers and fields of a surrogate without touch at one place."""
+
+    numbers: Prediction
+    fields: tuple[FieldSummary, ...]
+
+    def words(self, names: Sequence[Range]) -> str:
+        """Return the answers as lines for a person."""
+        place, *lines, trust = self.numbers.words(names).split("\n")
+        return "\n".join([place, *lines, *(one.words() for one in self.fields), trust])
+
+    def as_dict(self, names: Sequence[Range]) -> dict[str, Any]:
+        """Return the answers as data for a program."""
+        fields = {one.name: one.as_dict() for one in self.fields}
+        return self.numbers.as_dict(names) | ({"fields": fields} if fields else {})
 
 
 @dataclass(frozen=True)
@@ -156,6 +230,20 @@ class Deflection:
             "displacement": self.displacement.tolist(),
             "beyond": _names_beyond(self.inputs, names),
         }
+
+
+def surrogate_answers(surrogate: Surrogate, X: np.ndarray) -> list[Answers]:
+    """Return the numbers and fields of a surrogate at inputs X (N, n)."""
+    spread, trusted = surrogate.deviation(X), surrogate.trusted(X)
+    spread = np.where(outside(X, surrogate.inputs).any(axis=1, keepdims=True), math.nan, spread)
+    fields = [shown for shown in surrogate.fields.values() if isinstance(shown, ModalField)]
+    rows = zip(X, surrogate.predict(X), spread, trusted, strict=True)
+    return [
+        Answers(
+            Prediction(x, surrogate.outputs, y, s, bool(i)), tuple(FieldSummary.of(one, x) for one in fields)
+        )
+        for x, y, s, i in rows
+    ]
 
 
 def predictions(network: Network | Fitted, X: np.ndarray) -> list[Prediction]:

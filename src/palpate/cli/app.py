@@ -22,6 +22,7 @@ from palpate.cli.table_options import Force, Json, Verbose, with_table_options
 from palpate.cli.touch_command import touch
 from palpate.cli.touch_options import DeadMan, Device, NoController, Unsoftened
 from palpate.cli.trace_commands import replay, trace_app
+from palpate.cli.umbridge_command import serve_umbridge
 from palpate.errors import UsageError
 from palpate.processes import CASE_LIMIT
 
@@ -334,6 +335,7 @@ app.command()(touch)
 app.command()(fit)
 app.command()(correct)
 app.command()(card)
+app.command("serve-umbridge")(serve_umbridge)
 dataset_app.command("export")(export_dataset)
 
 

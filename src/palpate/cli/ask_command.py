@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.cli.answer_at_place import Answer, Deflection, outside, predictions
+from palpate.cli.answer_at_place import Answer, Deflection, outside, predictions, surrogate_answers
 from palpate.cli.console import Console
 from palpate.errors import UsageError
 from palpate.format import count
@@ -44,7 +44,8 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         ranges = [asdict(r) for r in inputs]
         content = {"model": str(model), "kind": what, "inputs": ranges, "text": str(contents)}
         warning = _warning(contents)
-        noun = _NOUNS.get(what, what)
+        felt = getattr(contents, "can_be_touched", True)
+        noun = _NOUNS.get(what, what) if felt else "A surrogate of numbers and fields"
         names = ",".join(r.name for r in inputs)
         ways = [
             f"ask it   palpate ask {model} --at {names}",
@@ -57,6 +58,9 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
     if line is not None:
         inputs = line.inputs
         answers: Sequence[Any] = deflections(line, _places(at, inputs))
+        words = [one.words(inputs) for one in answers]
+    elif isinstance(contents, Surrogate) and not contents.can_be_touched:
+        answers = surrogate_answers(contents, _places(at, inputs))
         words = [one.words(inputs) for one in answers]
     elif isinstance(contents, Surrogate):
         X = _places(at, inputs)
@@ -99,7 +103,7 @@ def inputs_of(asked: Any) -> tuple[Range, ...]:
 
 def answers_at(body: Surrogate, X: np.ndarray) -> list[Answer]:
     """Return the answers of a body that is pressed or gripped, at inputs X (N, n)."""
-    energy: LearntEnergy = body.energy
+    energy: LearntEnergy = body.hand_energy
     known = energy.deviation(X) if energy.root is not None else np.full(len(X), math.nan)
     forces = energy.force(X)
     # a deviation is of what is like the training, and says nothing beyond it; that nothing is touched is exact

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.cli.answer_at_place import Prediction, predictions
+from palpate.cli.answer_at_place import Prediction, predictions, surrogate_answers
 from palpate.cli.ask_command import answers_at, inputs_of
 from palpate.cli.console import Console
 from palpate.errors import UsageError
@@ -60,9 +60,14 @@ def ask_table(
     answers: Sequence[Any] = []
     if len(asked):
         answers = (
-            answers_at(contents, asked) if isinstance(contents, Surrogate) else predictions(contents, asked)
+            predictions(contents, asked)
+            if not isinstance(contents, Surrogate)
+            else answers_at(contents, asked)
+            if contents.can_be_touched
+            else [one.numbers for one in surrogate_answers(contents, asked)]
         )
-    head, rows = (_of_bodies if isinstance(contents, Surrogate) else _of_networks)(answers)
+    felt = isinstance(contents, Surrogate) and contents.can_be_touched
+    head, rows = (_of_bodies if felt else _of_networks)(answers)
     named = ["line", *(f"{r.name} [{r.unit}]" if r.unit else r.name for r in inputs), *head]
     text = _as_csv(named, table.lines, X, whole, rows, len(head))
     lines = table.lines[whole].tolist()

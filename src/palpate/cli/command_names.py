@@ -25,6 +25,7 @@ MEANT = {
     **dict.fromkeys(("open", "serve"), "view"),
     **dict.fromkeys(("check", "test"), "validate"),
     **dict.fromkeys(("record",), "run"),
+    **dict.fromkeys(("umbridge", "um-bridge"), "serve-umbridge"),
 }
 """Other words for what a command does."""
 

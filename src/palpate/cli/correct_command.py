@@ -67,7 +67,7 @@ def correct_model(
     unit, than the model's.
     """
     body = Surrogate.load(model)
-    if body.energy.baseline.holds:
+    if body.hand_energy.baseline.holds:
         raise UsageError(
             f"{model} holds no body that is pressed.",
             why="Measured forces correct what a probe presses.",

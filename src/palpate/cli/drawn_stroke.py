@@ -165,7 +165,7 @@ def reservations_about(body: Surrogate, X: np.ndarray) -> list[str]:
             f"{1e3 * deepest:.3g} mm is deeper than the {1e3 * hand.deepest:.3g} mm that were trained: the shapes "
             "beyond are continued, and not learnt"
         ]
-    outside = float(1.0 - body.energy.inside(X).mean())
+    outside = float(1.0 - body.hand_energy.inside(X).mean())
     if outside:
         return [f"{share(outside)} of the states lie outside of what was trained: their shapes are continued"]
     return []

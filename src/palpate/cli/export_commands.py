@@ -64,6 +64,8 @@ def _read(file: Path) -> Surrogate | Network:
     from palpate.surrogates import Surrogate
 
     thing = load(file)
+    if isinstance(thing, Surrogate) and not thing.can_be_touched:
+        return thing.plain_network
     thing = getattr(thing, "network", thing)
     if not isinstance(thing, Surrogate | Network):
         raise UsageError(

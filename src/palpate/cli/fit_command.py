@@ -79,7 +79,7 @@ def fit_table(
         lines=table.lines[rows].tolist(),
         options=options,
     )
-    saved = model.save(out)
+    saved = model.surrogate(out.stem).save(out)
     content = {
         "model": str(saved),
         "table": str(path),

@@ -44,6 +44,7 @@ KEPT = {
     "replay": "The recorded touch is as it was, and none is written.",
     "run": "The report is of the ticks until then, and so is a recording.",
     "schema": _AS_BEFORE,
+    "serve-umbridge": "The model is as it was.",
     "show": "The solved bodies are as they were.",
     "sweep": _GOES_ON,
     "touch": "What was begun is kept beside the part: the same command goes on.",

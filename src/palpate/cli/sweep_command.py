@@ -72,10 +72,22 @@ def sweep(
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
-    """Solve the finite-element model of a study over its ranges. An interrupted sweep continues where it stopped."""
+    """Solve the finite-element model of a study over its ranges. An interrupted sweep continues where it stopped.
+
+    A study with a table *solver* runs the program that it names, once for each case; the command is printed first.
+    """
     from palpate.cli.study_commands import sweep_file
+    from palpate.study.solver_study import says_solver
     from palpate.sweeps import Scheduler
 
+    if says_solver(study):
+        from palpate.cli.solver_sweep_command import SolverSweepOptions, sweep_solver_file
+
+        chosen = until is not None or minutes is not None
+        elsewhere = any(option is not None for option in (scheduler, tls_ca, tls_cert, tls_key))
+        wishes = SolverSweepOptions(samples, workers, case_limit, chosen, elsewhere)
+        sweep_solver_file(study, wishes, Console(as_json, verbose))
+        return
     if scheduler is not None:
         own = Scheduler(scheduler, tls_ca, tls_cert, tls_key)
     elif tls_ca or tls_cert or tls_key:

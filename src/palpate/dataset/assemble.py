@@ -100,6 +100,17 @@ def _coords(ranges: Sequence[Range], layout: Layout, schema: Iterable[Field]) ->
         coords["along"] = ("along", _text(r.name for r in ranges))
     labels = (layout.labels or {}).items()
     coords |= {dim: (dim, _text(names)) for dim, names in labels if dim in dims}
+    for dim, (values, unit) in (layout.scales or {}).items():
+        coords[dim] = (dim, np.asarray(values, dtype=float), _attrs(unit, dim))
+    if layout.cells is not None:
+        centres, cell_of = layout.cells
+        coords["cell_centre"] = (
+            ("cell", "axis"),
+            np.asarray(centres, dtype=float),
+            _attrs("m", "middle of the cell"),
+        )
+        if len(cell_of):
+            coords["cell_of"] = ("triangle", np.asarray(cell_of, dtype=np.int64))
     return coords | _surface_coords(layout)
 
 

@@ -204,6 +204,11 @@ class Layout:
     drawn : pair of (p, 3) array and (q, 3) array of int, optional
         Points in m and triangles of the body's own surface at full detail, which pictures show; by default they show
         `triangles`.
+    cells : pair of (c, 2 or 3) array and (t,) array of int, optional
+        Middle of each cell in m, and for each triangle its cell, for answers with the dimension ``cell``; the second is
+        empty where triangles don't tell it.
+    scales : mapping of a dimension to values and a unit, optional
+        Axes along which answers are curves, such as ``{"time": (times, "s")}``.
     labels : mapping of a dimension to names, optional
         For further dimensions of the answers; by default ``{"reaction": ("F_x", "F_y", "M")}`` in the plane.
 
@@ -224,6 +229,8 @@ class Layout:
     surface_of: np.ndarray | None = None
     labels: Mapping[str, Sequence[str]] | None = None
     drawn: tuple[np.ndarray, np.ndarray] | None = None
+    cells: tuple[np.ndarray, np.ndarray] | None = None
+    scales: Mapping[str, tuple[Sequence[float], str]] | None = None
 
     def __post_init__(self) -> None:
         def fill(name: str, value: object) -> None:
@@ -259,6 +266,14 @@ class Layout:
         _require(
             len(self.axes) == self.rest.shape[1], f"axes are {self.axes} in {self.rest.shape[1]} dimensions"
         )
+        for dim, (values, _) in (self.scales or {}).items():
+            ascending = np.ndim(values) == 1 and bool((np.diff(values) > 0).all())
+            _require(ascending, f"the values of the scale {dim!r} do not ascend")
+        if self.cells is not None:
+            centres, own = (np.shape(array) for array in self.cells)
+            of_triangles = own in {(0,), (0 if self.triangles is None else len(self.triangles),)}
+            fits = len(centres) == 2 and centres[1] == self.rest.shape[1] and of_triangles
+            _require(fits, f"cells have the shapes {centres} and {own}")
         if self.surface_of is not None:
             indices, count = np.asarray(self.surface_of), 0 if self.triangles is None else len(self.triangles)
             _require(
@@ -299,6 +314,8 @@ def check_schema(schema: Iterable[Field], layout: Layout, inputs: int) -> None:
         "input": inputs,
         "along": inputs,
         **{dim: len(names) for dim, names in (layout.labels or {}).items()},
+        **{dim: len(values) for dim, (values, _) in (layout.scales or {}).items()},
+        **({} if layout.cells is None else {"cell": len(layout.cells[0])}),
     }
     for field in with_bookkeeping(schema):
         for dim, size in zip(field.dims, field.shape, strict=True):

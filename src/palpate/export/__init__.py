@@ -13,6 +13,7 @@ check_library   a library that answers through its Python wrapper
 fmu_export      `palpate export fmu`: description, weights and the binaries of fmu_binaries, which read them
 check_fmu       an FMU that answers through FMPy
 core            the C sources; templates: texts of exported files
+umbridge_server a learnt file as a model of UM-Bridge, on this machine
 gltf            a deforming surface as glTF with morph targets
 shape_files     shapes of datasets and of learnt bodies, as VTU series and glTF
 """

@@ -69,7 +69,7 @@ def c_files(thing: Surrogate | Network, block: WeightsBlock, name: str, *, singl
         ["NETWORK"],
     )
     if isinstance(thing, Surrogate):
-        felt, title = len(thing.energy.baseline.directions), title.splitlines()[0]
+        felt, title = len(thing.hand_energy.baseline.directions), title.splitlines()[0]
         has = {"BODY": True, "MEMORY": block.memory, "RELEASE": block.releases, "FIELD": block.field}
         parts = [part for part, there in has.items() if there]
     facts = _Facts(name, single, block, title, thing.inputs, outputs, felt)
@@ -91,7 +91,7 @@ def _words(facts: _Facts, thing: Surrogate | Network) -> dict[str, str]:
     sizes, along = [len(facts.inputs)], ""
     if isinstance(thing, Surrogate):
         sizes = list(body_sizes(thing, facts.block))
-        along = ", ".join(_braces_around(row, facts) for row in thing.energy.baseline.directions)
+        along = ", ".join(_braces_around(row, facts) for row in thing.hand_energy.baseline.directions)
     places = ("INPUTS", "FELT", "PARAMETERS", "WORK", "STATE", "SHAPE", "NODES", "COMPONENTS")
     middle = [_number((r.low + r.high) / 2, single=facts.single) for r in facts.inputs[facts.felt :]]
     return {
@@ -179,7 +179,7 @@ def _notes(facts: _Facts, thing: Surrogate | Network) -> list[str]:
     """Return what the header tells of the arguments of its functions."""
     if isinstance(thing, Network):
         return ["", *(f"output {i}: {q.name} {q.unit}".rstrip() for i, q in enumerate(facts.outputs[:50]))]
-    holds = thing.energy.baseline.holds
+    holds = thing.hand_energy.baseline.holds
     x = "displacement of what the hand holds from its rest" if holds else "centre of the probe"
     return ["", f"x (3) is the {x}, m; p are the inputs after the first {facts.felt}, in their units."]
 
@@ -190,7 +190,7 @@ def _work_size(block: WeightsBlock) -> int:
 
 def body_sizes(surrogate: Surrogate, block: WeightsBlock) -> tuple[int, ...]:
     """Return the eight sizes that `NAME_sizes` gives."""
-    inputs, felt = len(surrogate.inputs), len(surrogate.energy.baseline.directions)
+    inputs, felt = len(surrogate.inputs), len(surrogate.hand_energy.baseline.directions)
     # the four numbers of a ledger come first in the state of a memory
     state = 4 + surrogate.memory.c_size() if block.memory and surrogate.memory is not None else 0
     nodes, components, shape = _shape_sizes(block) if block.field else (0, 0, 0)

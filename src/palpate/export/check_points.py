@@ -149,7 +149,7 @@ class Precision:
 
 def places(surrogate: Surrogate, count: int = 1000, seed: int = 0) -> np.ndarray:
     """Return places and parameters (N, 3 + p): inside, on the border, outside, at first contact, some not-a-number."""
-    energy, rng = surrogate.energy, np.random.default_rng(seed)
+    energy, rng = surrogate.hand_energy, np.random.default_rng(seed)
     low, high = bounds(energy.inputs)
     span, D, k = high - low, energy.baseline.directions, len(energy.baseline.directions)
     inner = rng.uniform(low, high, (count * 45 // 100, len(low)))
@@ -209,7 +209,7 @@ def compare_body(
     posterior did. `partial` leaves out columns that the export answers by not-a-number throughout.
     """
     precision = precision or Precision()
-    energy, X = surrogate.energy, places(surrogate)
+    energy, X = surrogate.hand_energy, places(surrogate)
     wanted, got = true_answers(energy, X), asker.answers(X).copy()
     k = len(energy.baseline.directions)
     known = np.where(np.isfinite(X), X, 0.0)
@@ -361,7 +361,7 @@ def _flags(
 
 def _stroke(surrogate: Surrogate, asker: Asker, precision: Precision) -> dict[str, Difference]:
     """Compare along a stroke in and out and sideways, at uneven times."""
-    energy, memory = surrogate.energy, surrogate.memory
+    energy, memory = surrogate.hand_energy, surrogate.memory
     assert memory is not None
     low, high = bounds(energy.inputs)
     D, k = energy.baseline.directions, len(energy.baseline.directions)
@@ -388,7 +388,7 @@ def _stroke(surrogate: Surrogate, asker: Asker, precision: Precision) -> dict[st
 
 def compare_rest(surrogate: Surrogate, export: Releaser) -> Difference:
     """Return how far the places are from palpate where a body lies that was led about and let go."""
-    energy, memory, rng = surrogate.energy, surrogate.memory, np.random.default_rng(3)
+    energy, memory, rng = surrogate.hand_energy, surrogate.memory, np.random.default_rng(3)
     assert memory is not None
     low, high = bounds(energy.inputs)
     D = energy.baseline.directions
@@ -418,7 +418,7 @@ def compare_field(
     The asker answers `shapes` of the field `shown`. Its modes were rounded: it may be off by 1e-4 of its largest value.
     """
     X = np.vstack([places(surrogate)[:_TOUCHES], deepest_touches(surrogate, shown)])
-    X = X[(true_answers(surrogate.energy, X)[:, 20].astype(int) & TOO_DEEP) == 0]
+    X = X[(true_answers(surrogate.hand_energy, X)[:, 20].astype(int) & TOO_DEEP) == 0]
     wanted, got = shown.values(X), asker.shapes(X)
     limit = np.full(len(X), PROMISE if precision is None or not precision.single else 1e-3)
     return _difference(wanted.reshape(len(X), -1), got.reshape(len(X), -1), limit)

@@ -69,13 +69,13 @@ class RoundedModes:
 
 def _trained_touches(surrogate: Surrogate, shown: FieldSurrogate) -> np.ndarray:
     """Return trained inputs (N, n) at which the probe touches."""
-    X = surrogate.energy.trained_rows()
-    return X[surrogate.energy.inside(X) & (shown.depth(X) > 0.0)]
+    X = surrogate.hand_energy.trained_rows()
+    return X[surrogate.hand_energy.inside(X) & (shown.depth(X) > 0.0)]
 
 
 def _all_touches(surrogate: Surrogate, shown: FieldSurrogate) -> np.ndarray:
     """Return trained touches (N, n), and others in the ranges and beyond them, where coefficients may be larger."""
-    going, baseline = shown.continuation, surrogate.energy.baseline
+    going, baseline = shown.continuation, surrogate.hand_energy.baseline
     assert going is not None
     low, high = bounds(shown.inputs)
     unit = np.random.default_rng(0).uniform(size=(_OTHERS, len(low)))

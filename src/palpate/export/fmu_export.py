@@ -74,7 +74,7 @@ class ExportedFmu:
         """
         if importlib.util.find_spec("fmpy") is None:
             return None
-        known = self.deviation and surrogate.energy.root is not None
+        known = self.deviation and surrogate.hand_energy.root is not None
         with CheckFmu(self.path) as fmu:
             comparison = compare_body(surrogate, fmu, deviation=known, partial=True)
         why, fix = "Its binary or this machine may bend the arithmetic.", "Report this: it must not be used."
@@ -141,7 +141,7 @@ def export_fmu(
     block = WeightsBlock.of(surrogate, deviation=deviation)
     _, _, baseline, memory = block.tables[0].values[:4].tolist()
     if baseline == 0 or (surrogate.memory is not None and memory == 0):
-        kind = f"baseline {surrogate.energy.baseline.name!r}"
+        kind = f"baseline {surrogate.hand_energy.baseline.name!r}"
         kind = kind if baseline == 0 or surrogate.memory is None else f"memory {surrogate.memory.name!r}"
         raise UsageError(
             f"The {kind} is not in the generic binary of FMUs.",

@@ -84,7 +84,7 @@ def body_variables(surrogate: Surrogate) -> list[Variable]:
 
 
 def _inputs(surrogate: Surrogate) -> list[Variable]:
-    held = surrogate.energy.baseline.holds
+    held = surrogate.hand_energy.baseline.holds
     place = "displacement of what the hand holds" if held else "centre of the probe"
     # where nothing is felt: at rest, or as high as it may be in the middle of the ranges
     start = [0.0] * 3 if held else [*(_middles(surrogate)[:2]), float(surrogate.inputs[2].high)]
@@ -199,7 +199,7 @@ def _middles(surrogate: Surrogate) -> list[float]:
 
 def _usual_amplitude(surrogate: Surrogate) -> float:
     """Return |q| of a deep press, √J: what the binary takes for the usual size of a state (core/fmi_instance.c)."""
-    energy, middles = surrogate.energy, np.array(_middles(surrogate))
+    energy, middles = surrogate.hand_energy, np.array(_middles(surrogate))
     low, high = bounds(energy.inputs)
     felt = len(energy.baseline.directions)
     place = (

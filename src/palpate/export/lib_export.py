@@ -160,7 +160,7 @@ def _copy(built: ExportedLibrary, folder: Path, *, overwrite: bool) -> ExportedL
 
 def _wrappers(surrogate: Surrogate, done: ExportedC) -> dict[str, str]:
     """Return the texts of the wrappers by their file names."""
-    name, baseline = done.name, surrogate.energy.baseline
+    name, baseline = done.name, surrogate.hand_energy.baseline
     middle = [(r.low + r.high) / 2 for r in surrogate.inputs]
     k = len(baseline.directions)
     place = sum(m * d for m, d in zip(middle[:k], baseline.directions, strict=True))

@@ -73,7 +73,7 @@ def export_onnx(
         add_network(graph, thing)
     else:
         block, name = WeightsBlock.of(replace(thing, fields={})), thing.name
-        add_body(graph, thing.energy)
+        add_body(graph, thing.hand_energy)
     model = graph.model(name, _metadata(thing, block))
     comparison = _compared(thing, model, Precision(single, tolerance)) if check else None
     if comparison is not None:
@@ -123,14 +123,16 @@ def _compared(thing: Surrogate | Network, model: Any, precision: Precision) -> C
 
         return compare_network(thing, ask, precision)
     bare = replace(thing, fields={})
-    return compare_body(bare, OnnxAsker(session, bare), precision, deviation=thing.energy.root is not None)
+    return compare_body(
+        bare, OnnxAsker(session, bare), precision, deviation=thing.hand_energy.root is not None
+    )
 
 
 class OnnxAsker:
     """An ONNX Runtime session of an exported body, asked as every export is."""
 
     def __init__(self, session: Any, surrogate: Surrogate) -> None:
-        self._session, self._energy = session, surrogate.energy
+        self._session, self._energy = session, surrogate.hand_energy
         self._kind = np.float32 if session.get_inputs()[0].type == "tensor(float)" else np.float64
 
     def answers(self, X: np.ndarray) -> np.ndarray:

@@ -382,7 +382,7 @@ class _Improvement:
         self.pressed = self._pressed(train)
         self.values = np.full(len(train), np.nan)
         errors = getattr(getattr(result[1], "energy", None), "errors", None)
-        touching = np.flatnonzero(result[0].energy.baseline.coordinate(train.X) > 0)
+        touching = np.flatnonzero(result[0].hand_energy.baseline.coordinate(train.X) > 0)
         if errors is not None and len(errors) == len(touching):
             self.values[touching] = errors
 

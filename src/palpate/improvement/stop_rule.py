@@ -20,7 +20,7 @@ def relative_errors(surrogate: Surrogate, unseen: Dataset | None) -> np.ndarray:
     """Return the relative force errors (N,) of a surrogate on unseen solves that are stronger than a light touch."""
     if unseen is None or not len(unseen.ok):
         return np.empty(0)
-    energy = surrogate.energy
+    energy = surrogate.hand_energy
     solves = TouchSolves.of(unseen, energy.inputs)
     answer, inside = energy.force(solves.X), np.ones(len(solves), dtype=bool)
     samples = ForceSamples(solves.X[:, :3], solves.force, answer, inside)

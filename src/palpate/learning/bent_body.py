@@ -35,6 +35,7 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning.growth_frames import GrowthRecorder
 from palpate.learning.learn import Learned, learn
+from palpate.learning.recognised import Recognised, Request, recogniser
 from palpate.learning.structure import refined_network
 from palpate.network import Network
 from palpate.options import Refinement, SearchOptions
@@ -51,7 +52,7 @@ from palpate.surrogates import (
 )
 from palpate.units import Quantity, Range, bounds
 
-__all__ = ["FEWEST", "BentSolves", "hand_coordinates", "node_outputs"]
+__all__ = ["FEWEST", "BentSolves", "hand_coordinates", "node_outputs", "recognise_bent"]
 
 FEWEST = 4  # solves for an affine map of one input, and one to judge it by
 _OBSERVATIONS = 1250  # five passes over the founding study's 251 training loads
@@ -59,6 +60,25 @@ _LEVEL = 3.0  # of the largest energy: ln(1 + U/U₀) is then nearly as smooth a
 _UNITS, _EFFORT = (12, 36), (1.0, 0.5)  # of the energy, for one load and for several
 # solves of beams carry no noise, and their baseline has no rivals: one network goes down to round-off
 _NOISELESS = {"choose": False, "networks": 1, "target": 1e-9, "ridge": 1e-13, "tolerance": 1e-9}
+
+
+@recogniser
+def recognise_bent(data: Dataset, request: Request) -> Recognised | None:
+    """Return the body of solves under loads at nodes; None of any other dataset."""
+    if "input_node" not in data:
+        return None
+    names = ("heldout", "settings", "refinement", "passes", "coupling", "progress", "watch")
+    own, further = request.split(*names)
+    bent = BentSolves.of(data, request.search, **own)
+    return Recognised(
+        bent.baseline,
+        bent.solves,
+        bent.options | further,
+        rows=bent.rows,
+        fields=bent.fields,
+        meta=bent.meta,
+        filter=bent.filter.history,
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
-"""`palpate.learn`: a dataset of solves made into a body that is felt and seen.
+"""`palpate.learn`: a dataset of solves made into a surrogate: what a hand feels where there is one, fields, numbers.
 
-What a dataset is of is asked once, here: of the recognisers of palpate, and of all registered baselines.
+What a dataset is of is asked once, of the registry in `recognised`. Where nothing that a hand feels is recognised, its
+numbers, fields and curves are learnt as they are.
 """
 
 from __future__ import annotations
@@ -8,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,18 +17,17 @@ from palpate import checks
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
 from palpate.format import count, share
-from palpate.learning.bent_body import BentSolves
+from palpate.learning import bent_body, pad_solves, pressed_solves  # noqa: F401  # which enter the kinds that they recognise
+from palpate.learning.arrays.fit import fit
+from palpate.learning.arrays.fitted import Fitted
+from palpate.learning.dataset_answers import DatasetAnswers
 from palpate.learning.energy import EnergyHistory, SuspectSolve, learn_energy
-from palpate.learning.fields import LearntField, learn_snapshots, lumped_mass
+from palpate.learning.fields import LearntField, LearntModes, learn_modes
 from palpate.learning.learning_history import History
-from palpate.learning.pad_fit import fit_pad
-from palpate.learning.pad_solves import is_padded, pad_solves
-from palpate.learning.painted_region import PaintedRegion
-from palpate.learning.pressed_solves import PressedSolves, is_pressed
+from palpate.learning.recognised import Request, recognise
 from palpate.learning.search import Budget
-from palpate.options import FieldOptions, SearchOptions, takes
-from palpate.surrogates import Baseline, ContactLaw, LearntEnergy, Solves, Surrogate
-from palpate.surrogates.baselines import registered_baselines
+from palpate.options import FieldOptions, FitOptions, SearchOptions, takes
+from palpate.surrogates import Surrogate
 from palpate.surrogates.model_card import suspect_sentences
 
 __all__ = ["LearningHistory", "filter_record", "learn"]
@@ -36,7 +35,6 @@ __all__ = ["LearningHistory", "filter_record", "learn"]
 # fields that are learnt where a dataset has them, with what they are called and their units
 _SHOWN = {"displacement": ("displacement", "m"), "von_mises": ("von Mises stress", "Pa")}
 _FIELD_SHARE = 0.25  # of the energy's limit on time, for each field: most of a shape is found at once
-_PAD_UNITS, _PAD_NETWORKS = 192, 4  # of one network and of a mean, for a pad in five dimensions
 
 Log = Callable[[str], None]
 
@@ -47,10 +45,15 @@ class LearningHistory:
 
     Attributes
     ----------
-    energy : EnergyHistory
-        Every network that was tried for the energy, and the error of each solve when it is left out.
-    fields : mapping of name to LearntField
+    energy : EnergyHistory, optional
+        Every network that was tried for the energy, and the error of each solve when it is left out; None where no
+        hand feels anything.
+    fields : mapping of name to LearntField or LearntModes
         The same of each field.
+    quantities : mapping of name to Fitted
+        The same of each group of numbers.
+    notes : tuple of str
+        What was left out of the dataset, and why.
     solves : int
         Number of solves that were learnt from.
     seconds : float
@@ -59,18 +62,27 @@ class LearningHistory:
         Record of the sequential filter, of a body that loads bend.
     """
 
-    energy: EnergyHistory
+    energy: EnergyHistory | None
     solves: int
     seconds: float
-    fields: Mapping[str, LearntField] = field(default_factory=dict)
+    fields: Mapping[str, LearntField | LearntModes] = field(default_factory=dict)
     filter: History | None = None
+    quantities: Mapping[str, Fitted] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def suspects(self) -> tuple[SuspectSolve, ...]:
         """Solves that contradict their neighbours, by their rows of the dataset."""
-        return self.energy.suspects
+        return () if self.energy is None else self.energy.suspects
 
     def __str__(self) -> str:
+        if self.energy is None:
+            lines = [f"{self.solves} solves, learnt in {self.seconds:.0f} s", *self.notes]
+            lines += [
+                f"{name}: error {share(one.heldout)} of its spread on solves left out"
+                for name, one in self.quantities.items()
+            ]
+            return "\n  ".join([*lines, *map(str, self.fields.values())])
         tried = len(self.energy.trials)
         words = f"{self.solves} solves, {tried} networks of the energy tried in {self.seconds:.0f} s"
         left = self.energy.meta.get("left_out", {})
@@ -80,6 +92,8 @@ class LearningHistory:
                 f"{share(left['p95'])} (95th percentile)"
             )
         for name, learnt in self.fields.items():
+            if isinstance(learnt, LearntModes):
+                continue
             missed = learnt.truncation
             size = (
                 f"{1e3 * missed:.2g} mm" if learnt.field.unit == "m" else f"{missed:.2g} {learnt.field.unit}"
@@ -96,23 +110,6 @@ def filter_record(history: Any) -> History | None:
     return own if isinstance(own, History) else None
 
 
-@dataclass(frozen=True, eq=False)
-class _Recognised:
-    """A dataset's baseline and solves, and what else is known of the body."""
-
-    baseline: Baseline
-    solves: Solves
-    options: Mapping[str, Any]  # of learning its energy
-    learn_field: Callable[[FieldOptions], LearntField] | None = None
-    region: Callable[[LearntEnergy], PaintedRegion | None] | None = None  # in place of that around the solves
-    fields: Mapping[str, Any] = field(default_factory=dict)  # that are learnt already
-    meta: Mapping[str, Any] = field(default_factory=dict)
-    filter: History | None = None
-    rows: np.ndarray | None = (
-        None  # converged solve that each of `solves` is, negative for none; None: in order
-    )
-
-
 @takes(SearchOptions)
 def learn(
     train: Dataset,
@@ -125,14 +122,18 @@ def learn(
     options: SearchOptions,
     **further: Any,
 ) -> tuple[Surrogate, LearningHistory]:
-    """Learn a body that can be felt and seen from a dataset of solves.
+    """Learn a surrogate from a dataset of solves.
+
+    Of a body under a probe, a pad or loads it is what a hand feels and an eye sees; of any other dataset its numbers,
+    its fields over nodes or cells, and its curves along an axis such as time.
 
     Parameters
     ----------
     train : Dataset
-        Of ``palpate.sweep(body, …)``; rows that did not converge are left out. The body's symmetry stands in it.
+        Of ``palpate.sweep(body, …)`` or `palpate.import_results`; rows that did not converge are left out. The body's
+        symmetry stands in it.
     name : str
-        The body's name, for its record and its page.
+        The surrogate's name, for its record and its page.
     layout : Layout, optional
         Of a mesh that is fine wherever the body shall be touched, where the sweep's is fine in a part only.
     shape : bool
@@ -164,8 +165,8 @@ def learn(
     Raises
     ------
     UsageError
-        If no baseline recognises the data, it lacks energies, has too few solves or none in contact, or lacks a row
-        that is to be left out.
+        If the data lack energies where a hand touches, have too few solves or none in contact, nothing to learn, or
+        lack a row that is to be left out.
     """
     if not isinstance(train, Dataset):
         raise UsageError(
@@ -174,11 +175,14 @@ def learn(
             fix="Pass what `palpate.sweep` returns; for arrays X and Y use `palpate.fit`.",
         )
     budget, began = Budget.of(options.effort, options.seconds), time.monotonic()
-    origin = {"hash": train.ok.hash, "provenance": train.provenance}
     numbers, excluded = _kept_rows(train, leave_out)
     train, solves = train.take(numbers), len(numbers)
+    origin = {"hash": train.ok.hash, "provenance": train.provenance}
+    known = recognise(train, Request(options, layout, further))
+    if known is None:
+        _refuse_options(further)
+        return _learn_answers(train, name, options, log)
     log(f"learning the energy of {count(solves, 'solve')}")
-    known = _recognise(train, layout, options, further)
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
 
     def limit(share: float) -> float | None:
@@ -187,7 +191,7 @@ def learn(
 
     first = limit(1.0 / (1.0 + _FIELD_SHARE * len(fields)))
     searches = vars(options) | {"seconds": first} | dict(known.options)
-    energy, found = learn_energy(known.solves, known.baseline, **searches)
+    energy, found = learn_energy(known.solves, known.baseline, rivals=known.rivals, **searches)
     painted = None if known.region is None else known.region(energy)
     energy = energy if painted is None else replace(energy, region=painted.region)
     learnt: dict[str, LearntField] = {}
@@ -218,89 +222,67 @@ def _kept_rows(train: Dataset, leave_out: Sequence[int]) -> tuple[np.ndarray, li
     return np.setdiff1d(np.flatnonzero(train.converged), excluded), excluded
 
 
-def _recognise(
-    train: Dataset, layout: Layout | None, search: SearchOptions, options: Mapping[str, Any]
-) -> _Recognised:
-    """Return the first kind of body that a dataset is of; registered baselines are asked last."""
-    for kind in (_recognise_bent, _recognise_pressed, _recognise_held, _recognise_registered):
-        known = kind(train, layout, search, dict(options))
-        if known is not None:
-            return known
-    acting = train.provenance.get("problem", {}).get("interactions", [])
-    raise UsageError(
-        "This dataset is of no kind that can be learnt.",
-        why=f"On its body act {acting or 'no interactions that its provenance tells'}; no baseline recognises that.",
-        fix="Sweep a body under one probe or one glued pad, or register a baseline with `recognise`.",
+def _refuse_options(options: Mapping[str, Any]) -> None:
+    if options:
+        raise UsageError(
+            f"The option {next(iter(options))!r} is of bodies that a hand feels.",
+            why="No baseline recognises this dataset, so its numbers and fields are learnt.",
+            fix="Leave it out, or register a baseline with `recognise`.",
+        )
+
+
+def _learn_answers(
+    train: Dataset, name: str, options: SearchOptions, log: Log
+) -> tuple[Surrogate, LearningHistory]:
+    """Learn the numbers, fields and curves of a dataset that no hand feels."""
+    budget, began = Budget.of(options.effort, options.seconds), time.monotonic()
+    answers = DatasetAnswers.of(train)
+    numbers: dict[str, Fitted] = {}
+    fields: dict[str, LearntModes] = {}
+    for group, part in answers.numbers.items():
+        log(group)
+        search = _fit_options(options, budget, len(answers.numbers) + len(answers.fields) - len(numbers))
+        numbers[group] = fit(answers.X, part.values, list(answers.inputs), list(part.outputs), options=search)
+    for shown, one in answers.fields.items():
+        log(f"{shown} at {one.places}")
+        search = _fit_options(options, budget, len(answers.fields) - len(fields))
+        fields[shown] = learn_modes(
+            answers.X,
+            one.values,
+            inputs=answers.inputs,
+            places=one.places,
+            name=shown,
+            unit=one.unit,
+            components=one.components,
+            options=search,
+        )
+    meta = {
+        "name": name,
+        "solves": len(answers.X),
+        "dataset": {"hash": train.ok.hash, "provenance": train.provenance},
+        "left_out": {
+            **{f"{group}, error of its spread": one.heldout for group, one in numbers.items()},
+            **{
+                f"{shown}, error of its range, 95th percentile": one.relative for shown, one in fields.items()
+            },
+        },
+    }
+    surrogate = Surrogate(
+        fields={shown: one.field for shown, one in fields.items()},
+        meta=meta,
+        quantities={
+            group: part for group, one in numbers.items() for part in one.surrogate().quantities.values()
+        },
+    )
+    spent = time.monotonic() - began
+    return surrogate, LearningHistory(
+        None, len(answers.X), spent, fields, quantities=numbers, notes=answers.notes
     )
 
 
-def _take(options: dict[str, Any], *names: str) -> dict[str, Any]:
-    """Return options of these names, and take them out of all."""
-    return {name: options.pop(name) for name in names if name in options}
-
-
-def _recognise_bent(
-    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
-) -> _Recognised | None:
-    del layout
-    if "input_node" not in train:
-        return None
-    own = _take(options, "heldout", "settings", "refinement", "passes", "coupling", "progress", "watch")
-    bent = BentSolves.of(train, search, **own)
-    context: dict[str, Any] = {"fields": bent.fields, "meta": bent.meta, "filter": bent.filter.history}
-    return _Recognised(bent.baseline, bent.solves, bent.options | options, rows=bent.rows, **context)
-
-
-def _recognise_registered(
-    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
-) -> _Recognised | None:
-    del layout, search
-    pairs = (cls.recognise(train) for cls in registered_baselines())
-    baseline, solves = next((pair for pair in pairs if pair is not None), (None, None))
-    if baseline is None or solves is None:
-        return None
-    return _Recognised(baseline, solves, {**solves.options, **options})
-
-
-def _recognise_pressed(
-    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
-) -> _Recognised | None:
-    if not is_pressed(train):
-        return None
-    pressed = PressedSolves.of(train, layout)
-
-    def learn_field(field: FieldOptions) -> LearntField:
-        return learn_snapshots(
-            pressed.snapshots(field.name, seed=search.seed),
-            inputs=pressed.inputs,
-            points=pressed.points,
-            triangles=pressed.triangles,
-            mass=lumped_mass(pressed.points, pressed.triangles),
-            surface=pressed.surface,
-            radius=pressed.radius,
-            radius_input=pressed.radius_input,
-            options=field,
-            drawn=pressed.drawn,
-        )
-
-    baseline = pressed.baseline
-    law, length = options.pop("law", "auto"), options.pop("length", None)
-    if isinstance(law, ContactLaw):
-        baseline, options["choose"] = replace(baseline, law=law), False
-    elif length is not None:
-        baseline = replace(baseline, law=ContactLaw("series", length))
-    known = {"deepest": pressed.deepest or None}
-    region = partial(pressed.painted_region, deviation=options.pop("deviation", None))
-    return _Recognised(baseline, pressed.solves, known | options, learn_field, region)
-
-
-def _recognise_held(
-    train: Dataset, layout: Layout | None, search: SearchOptions, options: dict[str, Any]
-) -> _Recognised | None:
-    del layout, search
-    if not is_padded(train):
-        return None
-    solves = pad_solves(train)
-    baseline = fit_pad(solves, **_take(options, "degree", "stiffening"))[0]
-    known = {"units_max": _PAD_UNITS, "networks": _PAD_NETWORKS}
-    return _Recognised(baseline, solves, known | options)
+def _fit_options(options: SearchOptions, budget: Budget, left: int) -> FitOptions:
+    """Return the options of a fit that takes its share of the time, so many fits being left."""
+    seconds = None if options.seconds is None else max(budget.left / left, 0.1)
+    workers = 1 if options.workers is None else options.workers
+    effort = FitOptions().effort * options.effort
+    return FitOptions(effort=effort, seconds=seconds, workers=workers, seed=options.seed)

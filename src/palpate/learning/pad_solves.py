@@ -7,10 +7,13 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
+from palpate.learning.pad_fit import fit_pad
+from palpate.learning.recognised import Recognised, Request, recogniser
 from palpate.surrogates import Solves
 
-__all__ = ["is_padded", "pad_solves"]
+__all__ = ["is_padded", "pad_solves", "recognise_held"]
 
+_UNITS, _NETWORKS = 192, 4  # of one network and of a mean, for a pad in five dimensions
 _MOVES = ("d_x", "d_y", "d_z")
 _AXES = {"p_x": 0, "p_y": 1, "p_z": 2}
 
@@ -19,6 +22,17 @@ def is_padded(data: Dataset) -> bool:
     """Return whether a dataset is of a body under one glued pad and nothing else."""
     acting = data.provenance.get("problem", {}).get("interactions", [])
     return [interaction.get("type") for interaction in acting] == ["GluedPad"]
+
+
+@recogniser
+def recognise_held(data: Dataset, request: Request) -> Recognised | None:
+    """Return the body of solves under one glued pad; None of any other dataset."""
+    if not is_padded(data):
+        return None
+    solves = pad_solves(data)
+    own, further = request.split("degree", "stiffening")
+    baseline = fit_pad(solves, **own)[0]
+    return Recognised(baseline, solves, {"units_max": _UNITS, "networks": _NETWORKS} | further)
 
 
 def pad_solves(data: Dataset) -> Solves:

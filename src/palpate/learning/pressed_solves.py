@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,16 @@ from palpate.dataset.carried_surface import (
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
-from palpate.learning.fields import Snapshots, lumped_mass
-from palpate.learning.kept_surface import touched_surface
+from palpate.learning.fields import LearntField, Snapshots, learn_snapshots, lumped_mass
+from palpate.learning.kept_surface import touched_overlap, touched_surface
 from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_region
-from palpate.surrogates import ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
-from palpate.surrogates.baselines import depth_series
+from palpate.learning.recognised import Recognised, Request, recogniser
+from palpate.options import FieldOptions
+from palpate.surrogates import Baseline, ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
+from palpate.surrogates.baselines import OverlapBaseline, depth_series
 from palpate.units import Range
 
-__all__ = ["FEWEST", "PressedSolves", "is_pressed"]
+__all__ = ["FEWEST", "PressedSolves", "is_pressed", "recognise_pressed"]
 
 FEWEST = 6  # solves in contact: what the law and an affine network have to be found from, and judged by
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # what "side" of a box means
@@ -35,6 +38,8 @@ RADIUS = "probe.radius"  # what a family calls it
 DISSIPATING = ("Plastic",)
 # of the radius: how the touched surface rolls off where it ends, as smooth in the middle as at its border
 SHOULDER = 1 / 3
+# of the overlap: from Hertz's rule on smooth curved surfaces to all of it
+WEIGHTS = (0.5, 0.75, 1.0)
 # shapes to learn a field from. A dome has 16 images of each solve: of 80, 400 shapes leave the largest error of unseen
 # ones at 0.35 mm, 800 at 0.20 and all at 0.17, learnt in 1, 1½ and 3 minutes
 MOST = 800
@@ -49,6 +54,40 @@ def _probe(data: Dataset) -> Mapping[str, Any] | None:
     acting = data.provenance.get("problem", {}).get("interactions", [])
     probes = [a for a in acting if isinstance(a, Mapping) and a.get("type") in PROBES]
     return probes[0] if len(probes) == len(acting) == 1 else None
+
+
+@recogniser
+def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
+    """Return the body of solves under one probe; None of any other dataset."""
+    if not is_pressed(data):
+        return None
+    pressed = PressedSolves.of(data, request.layout)
+
+    def learn_field(field: FieldOptions) -> LearntField:
+        return learn_snapshots(
+            pressed.snapshots(field.name, seed=request.search.seed),
+            inputs=pressed.inputs,
+            points=pressed.points,
+            triangles=pressed.triangles,
+            mass=lumped_mass(pressed.points, pressed.triangles),
+            surface=pressed.surface,
+            radius=pressed.radius,
+            radius_input=pressed.radius_input,
+            options=field,
+            drawn=pressed.drawn,
+        )
+
+    own, options = request.split("law", "length", "deviation")
+    baseline, law, length = pressed.baseline, own.get("law", "auto"), own.get("length")
+    if isinstance(law, ContactLaw):
+        baseline, options["choose"] = replace(baseline, law=law), False
+    elif length is not None:
+        baseline = replace(baseline, law=ContactLaw("series", length))
+    region = partial(pressed.painted_region, deviation=own.get("deviation"))
+    deepest = {"deepest": pressed.deepest or None}
+    # a law that was asked for is taken as it is
+    rivals = None if options.get("choose") is False else pressed.overlap_baselines
+    return Recognised(baseline, pressed.solves, deepest | options, learn_field, rivals=rivals, region=region)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +107,7 @@ class PressedSolves:
     # depth at which a contact is as wide as an element, m; None for elements of the usual size
     resolved: float | None
     deepest: float  # depth that the solves were made to, m; 0 where the provenance does not tell
+    skin: tuple[np.ndarray, np.ndarray]  # points (P, 3) in m and triangles (t, 3) of which `surface` is made
     # corners (t, 3, 3) of the triangles of the surface that was to be pressed all over, and of all others, m; None
     # where the presses keep a margin
     painted: tuple[np.ndarray, np.ndarray] | None = None
@@ -120,6 +160,7 @@ class PressedSolves:
             about,
             None if element is None else float(element) ** 2 / (2 * radius),
             _deepest(probe),
+            (rest, triangles[met]),
             None if rim is None else (rest[triangles[touched]], rest[triangles[~touched]]),
             drawn,
         )
@@ -129,6 +170,16 @@ class PressedSolves:
         """The contact baseline to begin with: pad on body, crossing at a tenth of the radius."""
         law = ContactLaw("series", self.radius / 10.0)
         return ContactBaseline(law, self.surface, self.radius, self.radius_input, self.resolved)
+
+    def overlap_baselines(self) -> list[Baseline]:
+        """Return the baselines by the ball's overlap; none over a flat surface, or where the radius is an input."""
+        if self.radius_input is not None:
+            return []
+        overlap, own = touched_overlap(self.data, self.surface, *self.skin), self.baseline
+        if overlap is None:
+            return []
+        parts = own.law, own.touched, own.probe_radius, None, own.resolved
+        return [OverlapBaseline(*parts, overlap.field(weight), weight) for weight in WEIGHTS]
 
     @property
     def solves(self) -> Solves:

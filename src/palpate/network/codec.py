@@ -330,12 +330,18 @@ class _Record:
             return shared
         # a file of before lacks what was added since, which is optional
         missing = self.forms.keys() - stored.keys() if isinstance(stored, Mapping) else self.forms.keys()
-        added = all(isinstance(self.forms[k], _Maybe) and getattr(self.cls, k, 0) is None for k in missing)
+        added = all(self._optional(k) for k in missing)
         if not isinstance(stored, Mapping) or not added or stored.keys() - self.forms.keys():
             raise ValueError(f"{path or 'it'} is not described as a {self.cls.__name__}")
         given = {k: self.forms[k].read(stored[k], _join(path, k), parts) for k in self.forms if k in stored}
         value = parts.values[path] = self.cls(**given)
         return value
+
+    def _optional(self, name: str) -> bool:
+        """Return whether a file may lack a field: one that may be nothing, or a mapping that is empty by default."""
+        if isinstance(self.forms[name], _ByName):
+            return self.cls.__dataclass_fields__[name].default_factory is dict  # type: ignore[attr-defined]
+        return isinstance(self.forms[name], _Maybe) and getattr(self.cls, name, 0) is None
 
     def _worth_sharing(self) -> bool:
         return not all(isinstance(form, _Scalar) for form in self.forms.values())

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from statistics import NormalDist
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -58,7 +58,7 @@ class Uncertainty:
     coefficients: np.ndarray
     root: np.ndarray
     through: np.ndarray
-    pattern: np.ndarray
+    pattern: Annotated[np.ndarray, np.int64]
     factor: np.ndarray = field(default_factory=lambda: np.ones(1))
 
     def deviation(self, X: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from palpate.devices import device_traits
 from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
-from palpate.surrogates import FieldSurrogate, NodeField, Surrogate, TouchedSurface
+from palpate.surrogates import FieldSurrogate, ModalField, NodeField, Surrogate, TouchedSurface
 from palpate.surrogates.memories import Memory
 from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.surrogate import correction_count, correction_warning
@@ -329,7 +329,8 @@ def touchable(model: Surrogate, name: str = "") -> Touchable:
         known += f", corrected by {touches} touches" + (
             " with a warning" if correction_warning(model.meta) else ""
         )
-    return Touchable(model.energy, dict(model.fields), known, model.memory, model.meta)
+    fields = {name: shown for name, shown in model.fields.items() if not isinstance(shown, ModalField)}
+    return Touchable(model.hand_energy, fields, known, model.memory, model.meta)
 
 
 def load_touchable(path: str | os.PathLike[str]) -> Touchable:

@@ -125,7 +125,7 @@ def main(kinds: Sequence[str]) -> None:
 
 def _compile_loop() -> None:
     # meanwhile the loop's process compiles the rest of its body's energy, which waits for these parts
-    pressed = slab().energy
+    pressed = slab().hand_energy
     _, small, felt, base, place, numbers, *_, grams, arguments, net = pressed.compiled()
     second_order_into.translate(place, felt[0], felt[1:], grams, *net)
     leave: Any = pressed.baseline.compiled().leave
@@ -136,7 +136,7 @@ def _compile_loop() -> None:
 
 def _compile_body(body: Surrogate) -> None:
     """Ask a body as learning, the loop and the page do, in this order."""
-    network = body.energy.network
+    network = body.hand_energy.network
     network.predict(np.zeros((FEW + 1, len(network.inputs))))
     TrainedRegion.of(np.random.default_rng(0).uniform(-1.0, 1.0, (20, len(network.inputs))))
     touchable(body).evaluator()

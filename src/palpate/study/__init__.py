@@ -11,6 +11,7 @@ part_study           study of a part that the user has
 run                  the stages: sweep, load the data, learn, validate, report
 improve_study        a study whose solves are chosen batch by batch, until a force error is reached
 part_work            the work behind the page of `palpate touch`, in a process of its own
+solver_study         study of another program's solver, `[solver]`, and solver_sweep its sweep
 study_advice         number of solves that would keep the limits
 """
 

@@ -66,6 +66,13 @@ def read_study(path: str | os.PathLike[str]) -> Study:
         raise StudyError(
             error.what, why=error.why, fix=f"{error.fix} `palpate init` writes a study."
         ) from error
+    if "solver" in content:
+        raise StudyError(
+            f"{path} is a study of another program's solver, [solver].",
+            why="Only `palpate sweep` starts that program; what it solves is a dataset.",
+            fix=f"`palpate sweep {path}` solves; then name its dataset, such as "
+            f"`palpate learn {path.parent / str(content.get('name', path.stem))}.zarr`.",
+        )
     try:
         return Study.model_validate(_beside(path.parent, _from_first_version(content)))
     except ValidationError as error:

@@ -1,8 +1,9 @@
-"""Learnt bodies: what a hand, an eye or a program can ask of them.
+"""Surrogates, learnt of models: energy, fields and numbers that a hand, an eye or a program asks for.
 
 ::
 
-    surrogate            the learnt body as one value, with its file
+    surrogate            energy, fields and quantities as one value, with its file
+    learnt_quantities    numbers of the inputs, with deviation and trained region
     model_card           what a file was made from, by whom, how good it is, where it ends
     energy               the energy that a hand feels: force, stiffness, trust
     baselines            what of the energy is known beforehand, one file for each kind of interaction
@@ -31,12 +32,22 @@ from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.energy_evaluator import EnergyEvaluator
 from palpate.surrogates.energy_kernels import Compiled
-from palpate.surrogates.fields import FieldEvaluator, FieldSurrogate, NodeField
+from palpate.surrogates.fields import (
+    AxisPlaces,
+    FieldEvaluator,
+    FieldSurrogate,
+    MeshPlaces,
+    ModalEvaluator,
+    ModalField,
+    NodeField,
+)
+from palpate.surrogates.learnt_quantities import LearntQuantities
 from palpate.surrogates.moving_rest import Followed
 from palpate.surrogates.surface import TouchedSurface
 from palpate.surrogates.surrogate import Surrogate
 
 __all__ = [
+    "AxisPlaces",
     "Baseline",
     "Compiled",
     "ConstantBaseline",
@@ -48,6 +59,10 @@ __all__ = [
     "FieldSurrogate",
     "Followed",
     "LearntEnergy",
+    "LearntQuantities",
+    "MeshPlaces",
+    "ModalEvaluator",
+    "ModalField",
     "NodeField",
     "PadBaseline",
     "RestStiffness",

@@ -31,6 +31,12 @@ QUASI_STATIC = (
     "gives mass and damping to what touches it, and no vibration or impact of the body itself is in the force."
 )
 
+_DATA_LIMITS = (
+    "The answers hold between the trained ends of every input, where samples lie; beyond, they are extrapolated.",
+    "It is as true as the samples that it was learnt from, and repeats their errors; it is no medical device.",
+)
+_LEVEL = "share of unseen samples that an interval is made to hold"
+
 
 @dataclass(frozen=True)
 class ModelCard:
@@ -139,7 +145,7 @@ def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard
     The SHA-256 of its file, if that is given, goes into the card.
     """
     network = getattr(model, "network", model)
-    if not (hasattr(model, "energy") or hasattr(network, "outputs")):
+    if not (hasattr(model, "can_be_touched") or hasattr(network, "outputs")):
         raise UsageError(
             f"A value of kind {type(model).__name__} has no model card.",
             why="Learnt bodies and networks have one.",
@@ -153,7 +159,10 @@ def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard
         "dataset": origin.get("hash") or _record(meta.get("training")).get("hash"),
         "configuration": provenance.get("config_hash"),
     }
-    parts = _of_body(model, meta) if hasattr(model, "energy") else _of_network(network, meta)
+    if hasattr(model, "can_be_touched"):
+        parts = _of_body(model, meta) if model.can_be_touched else _of_answers(model, meta)
+    else:
+        parts = _of_network(network, meta)
     inputs: Sequence[Range] = parts.pop("inputs")
     answers = {
         "inputs": [asdict(r) for r in inputs],
@@ -223,20 +232,51 @@ def suspect_sentences(suspects: Sequence[Any]) -> list[str]:
     return sentences
 
 
+def _of_answers(surrogate: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the card of a surrogate that no hand feels says of its numbers and fields."""
+    choice, validation = _record(meta.get("choice")), meta.get("validation")
+    errors = {
+        "unseen solves": validation,
+        "solves left out in turn": meta.get("left_out"),
+        "error on samples held out, relative to the outputs' spread": choice.get("heldout"),
+        _LEVEL: choice.get("level"),
+    }
+    warnings = [str(note) for note in choice.get("notes", ())]
+    if not _drop_empty({name: value for name, value in errors.items() if name != _LEVEL}):
+        warnings.append("It was not checked on samples that it has not seen, or the file does not say so.")
+    elif _record(validation).get("limits kept") is False:
+        warnings.append("It misses a limit on unseen solves: see the errors.")
+    parts = [*surrogate.quantities.values(), *surrogate.fields.values()]
+    n, m = len(surrogate.inputs), len(surrogate.outputs)
+    network = surrogate.plain_network if not surrogate.fields and len(surrogate.quantities) == 1 else None
+    plain = "" if network is None else f", {choice.get('form') or network.form}, {network.radial}"
+    return {
+        "kind": f"A network learnt from data: {count(n, 'input')}, {count(m, 'output')}."
+        if network is not None
+        else f"A surrogate learnt from solves: it {surrogate.purpose}.",
+        "inputs": surrogate.inputs,
+        "outputs": [
+            *(f"{q.name} ({q.unit or '1'})" for q in surrogate.outputs),
+            *(f"{n} ({f.unit or '1'})" for n, f in surrogate.fields.items()),
+        ],
+        "inside": "; ".join(map(str, parts)) if network is None else f"{count(network.units, 'unit')}{plain}",
+        "trained_on": {"columns of inputs": choice.get("columns")},
+        "errors": _drop_empty(errors),
+        "limits": _DATA_LIMITS,
+        "warnings": tuple(warnings),
+    }
+
+
 def _of_network(network: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the card of a network of data says; `palpate.fit` records its choice and its error."""
     choice, n, m = _record(meta.get("choice")), len(network.inputs), len(network.outputs)
     errors = {
         "error on samples held out, relative to the outputs' spread": choice.get("heldout"),
-        "share of unseen samples that an interval is made to hold": choice.get("level"),
+        _LEVEL: choice.get("level"),
     }
     warnings = [str(note) for note in choice.get("notes", ())]
     if choice.get("heldout") is None:
         warnings.append("It was not checked on samples that it has not seen, or the file does not say so.")
-    limits = [
-        "The answers hold between the trained ends of every input, where samples lie; beyond, they are extrapolated.",
-        "It is as true as the samples that it was learnt from, and repeats their errors; it is no medical device.",
-    ]
     return {
         "kind": f"A network learnt from data: {count(n, 'input')}, {count(m, 'output')}.",
         "inputs": network.inputs,
@@ -244,7 +284,7 @@ def _of_network(network: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
         "inside": f"{count(network.units, 'unit')}, {choice.get('form') or network.form}, {network.radial}",
         "trained_on": {"columns of inputs": choice.get("columns")},
         "errors": _drop_empty(errors),
-        "limits": tuple(limits),
+        "limits": _DATA_LIMITS,
         "warnings": tuple(warnings),
     }
 

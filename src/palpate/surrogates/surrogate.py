@@ -1,8 +1,9 @@
-"""A learnt body: the energy that a hand feels, the fields that an eye sees, and the record of its making, in one value.
+"""A surrogate of a model in one value: energy that a hand feels, fields, numbers, and the record of its making.
 
-This is what `palpate.learn` makes, what a file holds, and what everything downstream takes. What a body can do is asked
-of its parts: `energy.baseline` tells whether a hand presses it or holds it and where it is touched, `fields` what can
-be drawn.
+This is what `palpate.learn` makes, what a file holds, and what everything downstream takes. At least one of energy,
+fields and quantities is there, and what a surrogate can do is asked of them: `can_be_touched` tells whether a hand
+feels it, `energy.baseline` whether that hand presses it or holds it and where, `fields` what can be drawn, and
+`quantities` which numbers it answers.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import html
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -19,18 +20,20 @@ import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.format import count, millimetres, share
-from palpate.network import load_archive
+from palpate.network import Network, load_archive
 from palpate.network.codec import load_value, save_value
 from palpate.page_hook import page_of
 from palpate.surrogates.energy import LearntEnergy
-from palpate.surrogates.fields import FieldSurrogate, NodeField
+from palpate.surrogates.fields import FieldSurrogate, ModalField, NodeField
+from palpate.surrogates.learnt_quantities import LearntQuantities
 from palpate.surrogates.memories import Memory, Patches
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.surrogates.moving_rest import Followed, follow
-from palpate.units import Range, bounds
+from palpate.units import Quantity, Range, bounds
 
 __all__ = ["KIND", "Surrogate", "correction_count", "correction_warning"]
 
+_NAMED = 6  # numbers that are named in a line
 _SAMPLES = 4096  # places in the trained ranges, among which a typical press is found
 KIND = "surrogate"  # what the file's header calls it
 # kinds of files of version 0.1.0
@@ -39,59 +42,95 @@ _FORMER = ("touch", "held-body", "touched-body", "touch-surrogate", "grasp-surro
 
 @dataclass(frozen=True, eq=False)
 class Surrogate:
-    """A learnt body as a value: `save` and `load` give it back bit for bit.
+    """A surrogate of a model as a value: `save` and `load` give it back bit for bit.
 
     Attributes
     ----------
-    energy : LearntEnergy
-        Energy, force and stiffness, and whether they may be trusted.
-    fields : mapping of name to FieldSurrogate or NodeField
-        What is drawn of it: fields of the same touched surface and the same inputs, or of nodes; may be empty.
+    energy : LearntEnergy, optional
+        Energy, force and stiffness, and whether they may be trusted; None where no hand feels it.
+    fields : mapping of name to FieldSurrogate, NodeField or ModalField
+        What is drawn of it, of the same inputs: on a touched surface, at nodes that loads move, or of any physics at
+        places of a mesh or of an axis; may be empty.
     memory : Memory, optional
         What it remembers of how it was touched, in the loop and on the page.
     meta : mapping
         JSON-able record: its name, what it was learnt from and how well, what it was corrected with. `__str__` tells of
         ``solves``, ``samples`` and ``force_error`` (a mapping with ``median`` and ``p95``, relative) where they are
         there.
+    quantities : mapping of name to LearntQuantities
+        Numbers of the inputs, each group learnt together; may be empty.
 
     Raises
     ------
     UsageError
-        If a field is of another surface or other inputs, or the memory can't walk the energy's amplitude.
+        If there is none of energy, fields and quantities; if a part is of another surface or other inputs; or the
+        memory can't walk the energy's amplitude.
     """
 
-    energy: LearntEnergy
-    fields: Mapping[str, FieldSurrogate | NodeField] = field(default_factory=dict)
+    energy: LearntEnergy | None = None
+    fields: Mapping[str, FieldSurrogate | NodeField | ModalField] = field(default_factory=dict)
     memory: Memory | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
+    quantities: Mapping[str, LearntQuantities] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fields", dict(self.fields))
+        object.__setattr__(self, "quantities", dict(self.quantities))
+        self._require_one_model()
         for name, shown in self.fields.items():
-            if fault := shown.fault_beside(self.energy):
+            if self.energy is not None and (fault := shown.fault_beside(self.energy)):
                 raise UsageError(
                     f"The field {name!r} is not of the body that is touched.",
                     why=f"Beside this energy, {fault}.",
                     fix="Learn energy and fields from the same solves, with the same TouchedSurface.",
                 )
-        sign = self.energy.baseline.amplitude
-        if self.memory is not None and sign not in self.memory.walks:
+        if self.memory is None:
+            return
+        sign = self.hand_energy.baseline.amplitude
+        if sign not in self.memory.walks:
             raise UsageError(
-                f"The memory {self.memory.name!r} does not fit the baseline {self.energy.baseline.name!r}.",
+                f"The memory {self.memory.name!r} does not fit the baseline {self.hand_energy.baseline.name!r}.",
                 why=f"It walks an amplitude that is {' or '.join(sorted(self.memory.walks))}; here that is {sign}.",
                 fix="Leave the memory out, or give one that walks such an amplitude.",
             )
 
+    def _require_one_model(self) -> None:
+        """Refuse a surrogate of nothing, and parts without an energy whose inputs differ."""
+        names = [[(r.name, r.unit) for r in part.inputs] for part in self._parts()]
+        if not names:
+            raise UsageError(
+                "A surrogate of nothing can't be made.",
+                why="It has no energy, no fields and no quantities.",
+                fix="Give at least one of them; `palpate.learn` and `palpate.fit` make them.",
+            )
+        loads = any(isinstance(shown, NodeField) for shown in self.fields.values())
+        if not loads and any(other != names[0] for other in names[1:]):
+            raise UsageError(
+                "The parts of this surrogate have different inputs.",
+                why=" / ".join(", ".join(name for name, _ in part) for part in names),
+                fix="Learn energy, fields and quantities from the same solves.",
+            )
+
+    def _parts(self) -> Iterator[LearntEnergy | FieldSurrogate | NodeField | ModalField | LearntQuantities]:
+        """Yield everything that answers inputs, the energy first."""
+        yield from () if self.energy is None else (self.energy,)
+        yield from self.quantities.values()
+        yield from self.fields.values()
+
     def __str__(self) -> str:
         head = f"Surrogate {self.name!r}: {self.purpose}{_training(self.meta)}{self._remembers}"
-        ranges = f"  {', '.join(str(r) for r in self.inputs)}; {self.energy}"
-        return "\n".join([head, ranges, *(f"  {shown}" for shown in self.fields.values())])
+        energy = "" if self.energy is None else f"; {self.energy}"
+        ranges = f"  {', '.join(str(r) for r in self.inputs)}{energy}"
+        parts = [*self.quantities.values(), *self.fields.values()]
+        return "\n".join([head, ranges, *(f"  {part}" for part in parts)])
 
     __repr__ = __str__
 
     @property
     def purpose(self) -> str:
         """The use of the body in plain words: what a hand does with it, how far it was trained, and what is drawn."""
+        if self.energy is None:
+            return self._answers_in_words
         known, baseline = self.energy.going.deepest, self.energy.baseline
         if not baseline.holds:
             ball = "" if math.isnan(baseline.radius) else f" of radius {millimetres(baseline.radius)}"
@@ -101,6 +140,40 @@ class Surrogate:
             words = f"held and moved along {count(len(baseline.directions), 'direction')}"
         shown = ", ".join(name for name in self.fields)
         return words + (f"; shows its {shown}" if shown else "")
+
+    @property
+    def _answers_in_words(self) -> str:
+        """The numbers and fields that a surrogate without touch answers."""
+        numbers = [q.name for q in self.outputs]
+        more = f" and {len(numbers) - _NAMED} more" if len(numbers) > _NAMED else ""
+        curves = [name for name, shown in self.fields.items() if _is_curve(shown)]
+        fields = [name for name in self.fields if name not in curves]
+        words = [", ".join(numbers[:_NAMED]) + more] if numbers else []
+        for noun, names in (("curve", curves), ("field", fields)):
+            words += [f"the {noun}{'s' * (len(names) > 1)} {', '.join(names)}"] if names else []
+        return f"answers {' and '.join(words)}"
+
+    @property
+    def can_be_touched(self) -> bool:
+        """True where a hand feels it: it has an energy."""
+        return self.energy is not None
+
+    @property
+    def hand_energy(self) -> LearntEnergy:
+        """The energy that a hand feels.
+
+        Raises
+        ------
+        UsageError
+            If there is none.
+        """
+        if self.energy is None:
+            raise UsageError(
+                f"{self.name!r} can't be touched.",
+                why=f"It {self._answers_in_words}, and has no energy whose slope would be a force.",
+                fix="Ask it for its numbers and fields: `palpate ask FILE --at …`, or surrogate.predict(X).",
+            )
+        return self.energy
 
     @property
     def _remembers(self) -> str:
@@ -113,13 +186,61 @@ class Surrogate:
 
     @property
     def inputs(self) -> tuple[Range, ...]:
-        """Names and trained ranges of all inputs: the felt coordinates (m), then the further ones."""
-        return self.energy.inputs
+        """Names and trained ranges of all inputs: of a touched body the felt coordinates (m), then the further ones."""
+        return next(self._parts()).inputs
 
     @property
     def parameters(self) -> tuple[Range, ...]:
-        """The inputs that the hand does not supply."""
-        return self.energy.parameters
+        """The inputs that the hand does not supply: all of them, where no hand feels it."""
+        return self.inputs if self.energy is None else self.energy.parameters
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """Names and units of the m numbers of all quantities, in their order."""
+        return tuple(q for part in self.quantities.values() for q in part.outputs)
+
+    @property
+    def plain_network(self) -> Network:
+        """The network, where the surrogate is one group of quantities and nothing else.
+
+        Raises
+        ------
+        UsageError
+            If it is more than that.
+        """
+        if self.energy is None and not self.fields and len(self.quantities) == 1:
+            return next(iter(self.quantities.values())).network
+        raise UsageError(
+            f"{self.name!r} is more than one network.",
+            why=f"It {self.purpose}.",
+            fix="Take one part of it: surrogate.quantities[name].network, or surrogate.fields[name].",
+        )
+
+    def predict(self, X: np.ndarray) -> np.ndarray:
+        """Return the numbers (N, m) of all quantities at inputs X (N, n), SI units, as `outputs` names them.
+
+        Raises
+        ------
+        UsageError
+            If X has another number of columns; so do all that take X.
+        """
+        return self._numbers([part.predict(X) for part in self.quantities.values()], X)
+
+    def deviation(self, X: np.ndarray) -> np.ndarray:
+        """Return the standard deviation (N, m) of these numbers at X (N, n); not-a-number where it is unknown."""
+        return self._numbers([part.deviation(X) for part in self.quantities.values()], X)
+
+    def trusted(self, X: np.ndarray) -> np.ndarray:
+        """Return which of X (N, n) are like what was learnt from, by every part of the surrogate, (N,) bool."""
+        answers = [
+            part.trusted(X) for part in self._parts() if isinstance(part, ModalField | LearntQuantities)
+        ]
+        answers += [] if self.energy is None else [self.energy.inside(X)]
+        return np.asarray(np.all(answers, axis=0)) if answers else np.ones(len(X), dtype=bool)
+
+    @staticmethod
+    def _numbers(columns: list[np.ndarray], X: np.ndarray) -> np.ndarray:
+        return np.concatenate(columns, axis=1) if columns else np.zeros((len(X), 0))
 
     def to_html(self) -> str:
         """Return the body as one HTML page that is touched from disk, without a server or a network.
@@ -132,7 +253,9 @@ class Surrogate:
         return page_of(self)
 
     def _repr_html_(self) -> str | None:
-        """Show the body in a notebook, in a frame of its own; None where it can't be a page."""
+        """Show the body in a notebook, in a frame of its own, or its card; None where it can't be a page."""
+        if not self.can_be_touched:
+            return self.card()._repr_html_()
         try:
             page = self.to_html()
         except UsageError:
@@ -161,7 +284,7 @@ class Surrogate:
                 k: replace(v, surface=surface) if isinstance(v, FieldSurrogate) else v
                 for k, v in shown.items()
             }
-        return Surrogate(energy, shown, self.memory, self.meta if meta is None else meta)
+        return replace(self, energy=energy, fields=shown, meta=self.meta if meta is None else meta)
 
     def with_memory(self, memory: Memory | None, *, spacing: float | None = None) -> Surrogate:
         """Return the same body with a memory, in the loop and on the page.
@@ -199,11 +322,11 @@ class Surrogate:
         UsageError
             If the rows have another number of inputs, or the times don't fit.
         """
-        return follow(self.energy, self.memory, X, times)
+        return follow(self.hand_energy, self.memory, X, times)
 
     def _patches(self, spacing: float) -> Patches:
         """Return places of the touched surface, of the size that a typical press has."""
-        shown, baseline = next(iter(self.fields.values()), None), self.energy.baseline
+        shown, baseline = next(iter(self.fields.values()), None), self.hand_energy.baseline
         if not isinstance(shown, FieldSurrogate) or baseline.surface is None:
             raise UsageError(
                 "This body has no drawn surface to keep a memory on.",
@@ -223,11 +346,11 @@ class Surrogate:
         """Return half the deepest trained depth, m, and the energy of a press to about there, J."""
         low, high = bounds(self.inputs)
         X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
-        X = X[self.energy.inside(X)]
-        s, deepest = self.energy.depth(X), self.energy.going.deepest
+        X = X[self.hand_energy.inside(X)]
+        s, deepest = self.hand_energy.depth(X), self.hand_energy.going.deepest
         depth = (deepest if np.isfinite(deepest) else float(s.max())) / 2.0
         near = int(np.argmin(np.abs(s - depth)))
-        return depth, float(self.energy.energy(X[near : near + 1])[0])
+        return depth, float(self.hand_energy.energy(X[near : near + 1])[0])
 
     def card(self, file: str | os.PathLike[str] | None = None) -> ModelCard:
         """Return the model card: what it was made from, by whom, its errors, limits and hashes.
@@ -270,6 +393,10 @@ class Surrogate:
                 fix="Learn it again from its solves: `palpate learn STUDY.toml`, or pp.learn(data)[0].save(file).",
             )
         return load_value(path, cls, kind=KIND, noun="a learnt body")
+
+
+def _is_curve(shown: object) -> bool:
+    return isinstance(shown, ModalField) and shown.is_curve
 
 
 def _training(meta: Mapping[str, Any]) -> str:

@@ -11,6 +11,11 @@
     cluster.py     worker processes on this machine; worker.py is the process
     ledger.py      finished parts of an interrupted sweep, on disk
     grow_sweep.py  a finished sweep that is asked for more samples
+
+    command_problem.py  a problem that another program solves, once for each case
+    template_files.py   its input files, made of templates; program_run.py starts and ends it
+    umbridge_problem.py a problem that a model of UM-Bridge solves
+    answer_files.py     answers of a case, kept until the sweep is whole
 """
 
 from palpate.sweeps.cluster import LocalCluster, OnDemandCluster, Scheduler, local_cluster

@@ -76,6 +76,10 @@ class Limits:
         through zero.
     history_energy : float
         Share of the steps of these histories that give lost energy back.
+    answer_p95 : float
+        Error of numbers, fields and curves over the range of each, 95th percentile over solves and places.
+    answer_coverage : (float, float)
+        Smallest and largest share of these errors that the 90 % interval holds, all solves and places together.
 
     Raises
     ------
@@ -104,6 +108,8 @@ class Limits:
     history_force_median: float | None = 0.01
     history_force_p95: float | None = 0.035
     history_energy: float | None = 1e-9
+    answer_p95: float | None = 0.01
+    answer_coverage: tuple[float, float] | None = (0.80, 0.97)
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -331,6 +337,22 @@ CRITERIA = (
         0.0,
         "second law of thermodynamics",
         "A stiffness or a time of its elements is negative: learn the body anew.",
+    ),
+    Criterion(
+        "answer_p95",
+        "Numbers and fields, error over their range, 95th percentile",
+        "share",
+        0.005,
+        "palpate's own: a tenth of what the colours of a picture tell apart",
+        "Solve more cases, or cases nearer to the worst one, and learn again.",
+    ),
+    Criterion(
+        "answer_coverage",
+        "Share of these errors within the 90 % interval",
+        "share",
+        (0.85, 0.95),
+        _COVER,
+        "Learn from more solves: of few the widths themselves are uncertain.",
     ),
 )
 """Everything that is judged, in the order in which it is told."""

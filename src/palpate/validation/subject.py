@@ -49,6 +49,7 @@ class Subject:
     loads: Surrogate | None = None  # networks that answer by load
     body: Surrogate | None = None  # a body with memory
     histories: LoadHistories | None = None  # unseen, of that body
+    answering: Surrogate | None = None  # a surrogate that no hand feels, judged by its numbers and fields
     history: History | None = None  # record of the sequential filter
     refined: TouchSolves | None = None  # on a refined mesh
     strokes: Sequence[TouchSolves] = ()
@@ -67,6 +68,8 @@ class Subject:
         seed: int = 0,
     ) -> Subject:
         """Return a model with the rows of a test that it has not seen; for the parameters see `validate`."""
+        if isinstance(model, Surrogate) and not model.can_be_touched:
+            return _by_answers(model, test)
         line = line_of(model)
         if line is not None and model.memory is not None:
             if not isinstance(test, LoadHistories):
@@ -90,6 +93,48 @@ class Subject:
         if filter_record(history) is not None:
             raise UsageError("The model of an energy has no history of a filter.", fix="Leave `history` out.")
         return _by_place(model, test, refined, strokes, seed)
+
+
+def _by_answers(model: Surrogate, test: Any) -> Subject:
+    """Return a surrogate that answers numbers and fields, with the solves that it was not learnt from."""
+    if not isinstance(test, Dataset):
+        raise UsageError(
+            f"{model.name} is judged by a dataset, not by {type(test).__name__} {test!r:.60}.",
+            fix="Give what `palpate.sweep` or `palpate.import_results` returned, or `Dataset.open(path)`.",
+        )
+    good = test.ok
+    theirs, own = [(r.name, r.unit) for r in good.ranges], [(r.name, r.unit) for r in model.inputs]
+    if theirs != own:
+        raise UsageError(
+            f"The dataset's inputs are {', '.join(n for n, _ in theirs)}; "
+            f"{model.name} takes {', '.join(n for n, _ in own)}.",
+            fix="Test with solves of the same inputs, in the same order and units.",
+        )
+    seen = np.zeros(len(good), dtype=bool)
+    for part in (*model.quantities.values(), *model.fields.values()):
+        region = getattr(part, "region", getattr(getattr(part, "coefficients", None), "region", None))
+        if region is not None:
+            seen |= region.distances(part.network.scaling.scale_inputs(good.X)) < SEEN
+    if seen.all():
+        raise UsageError(
+            f"{model.name} was learnt from all {len(good)} solves of the test.",
+            fix="Test with solves that learning left out.",
+        )
+    unseen = good.take(np.flatnonzero(~seen))
+    notes = [f"{count(int(seen.sum()), 'solve')} left out: learnt from."] if seen.any() else []
+    if far := int((~model.trusted(unseen.X)).sum()):
+        notes.append(f"{far} of {len(unseen)} are in no training solve's neighbourhood, and not trusted.")
+    units = sum(part.network.units for part in (*model.quantities.values(), *model.fields.values()))
+    return Subject(
+        model.name,
+        len(unseen),
+        unseen.X,
+        model.inputs,
+        units=units,
+        data=unseen,
+        answering=model,
+        notes=tuple(notes),
+    )
 
 
 def _by_place(
@@ -204,10 +249,10 @@ def _by_load(
     """Return a body that loads bend: the hand is put where each solve has it."""
     _refuse_other_body(model, field, test)
     X = hand_inputs(model, field, test)
-    directions, touched = model.energy.baseline.directions, list(field.touched)
-    inside = model.energy.inside(X)
+    directions, touched = model.hand_energy.baseline.directions, list(field.touched)
+    inside = model.hand_energy.inside(X)
     samples = ForceSamples(
-        X[:, : len(touched)], -test.X[:, touched] @ directions, model.energy.force(X), inside
+        X[:, : len(touched)], -test.X[:, touched] @ directions, model.hand_energy.force(X), inside
     )
     turning = len(touched) > 1
     notes = [] if turning else ["Direction is not judged: the hand feels one direction only."]
@@ -219,7 +264,7 @@ def _by_load(
         test.X,
         test.ranges,
         samples=samples,
-        units=model.energy.network.units,
+        units=model.hand_energy.network.units,
         turning=turning,
         data=test,
         loads=model,
@@ -231,7 +276,7 @@ def _by_load(
 
 def hand_inputs(model: Surrogate, field: NodeField, data: Dataset) -> np.ndarray:
     """Return the energy's inputs (N, n) where each solve has the hand: its place (m), then the loads elsewhere (N)."""
-    compliance = getattr(model.energy.baseline, "compliance", 0.0)
+    compliance = getattr(model.hand_energy.baseline, "compliance", 0.0)
     hand = hand_coordinates(data, field.held, tuple(field.touched.tolist()), compliance)
     return np.hstack([hand, data.X[:, list(field.further)]])
 

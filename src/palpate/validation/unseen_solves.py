@@ -212,7 +212,7 @@ class TouchFunction:
         """Return the function that a surrogate answers; a function as it is."""
         if isinstance(model, TouchFunction):
             return model
-        energy = model.energy
+        energy = model.hand_energy
         return cls(
             model.name,
             energy.inputs,

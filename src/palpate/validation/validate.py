@@ -55,7 +55,7 @@ class Validation:
         What was not judged, and why.
     figures : mapping of name to Figure
         ``force``, ``energy``, ``stiffness``, ``smoothness``, ``coverage``, ``loops``, ``border_loops``, ``shape``,
-        ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``: see `palpate.validation.figures`.
+        ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``, ``answers``: see `palpate.validation.figures`.
     """
 
     name: str
@@ -143,6 +143,10 @@ class Validation:
         found: dict[str, Any] = {"unseen solves": self.samples}
         if self.networks is not None:
             found["displacement RMSE / full scale"] = self.networks.refined.relative
+        if self.answers is not None:
+            for one in self.answers:
+                found[f"{one.name}, error over its range, 95th percentile"] = one.p95
+            return {**found, "limits kept": self.passed}
         force = self.histories if self.force is None else self.force
         if self.histories is not None:
             found["unseen histories"] = self.histories.count

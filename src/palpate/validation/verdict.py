@@ -50,6 +50,9 @@ def _outcome(validation: Validation) -> str:
 def _force_error(validation: Validation) -> str:
     """Return the error of the force on the hand at the median and the 95th percentile, in words too."""
     force, along = validation.force, validation.histories
+    if validation.answers is not None:
+        worst = max(validation.answers, key=lambda one: one.p95)
+        return f"{worst.name} off by at most {share(worst.p95)} of its range for 95 of 100 values"
     if along is not None:
         noticed = felt(along.p95 / FORCE_JND)
         return (

@@ -24,7 +24,7 @@ def line_facts(line: NodeField, surrogate: Surrogate) -> dict[str, Any]:
     low, high = bounds(line.inputs)
     return {
         "stays": touchable(surrogate).stays,
-        "directions": surrogate.energy.baseline.directions.tolist(),
+        "directions": surrogate.hand_energy.baseline.directions.tolist(),
         "touched": line.touched.tolist(),
         "further": list(line.further),
         "by_place": line.asked_by == "place and load",

@@ -219,7 +219,7 @@ class _Page:
 
 def _shallow(surrogate: Surrogate) -> Surrogate:
     """Return the same body, which lets go of a probe about twice as deep as trained: its surface takes less room."""
-    baseline, deepest = surrogate.energy.baseline, touchable(surrogate).deepest
+    baseline, deepest = surrogate.hand_energy.baseline, touchable(surrogate).deepest
     surface = baseline.surface
     if surface is None:
         return surrogate
@@ -227,7 +227,7 @@ def _shallow(surrogate: Surrogate) -> Surrogate:
     if inner >= surface.inner:
         return surrogate
     nearer = baseline.with_surface(replace(surface, inner=inner))
-    return surrogate.with_energy(replace(surrogate.energy, baseline=nearer))
+    return surrogate.with_energy(replace(surrogate.hand_energy, baseline=nearer))
 
 
 def _places(model: PageModel) -> dict[str, Any] | None:

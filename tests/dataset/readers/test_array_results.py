@@ -104,7 +104,7 @@ def test_parquet_tables_keep_units_of_names_and_metadata(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.odb", b"\x89ODB\x00", "begins like no format"),
+        ("a.op2", b"\x89ODB\x00", "begins like no format"),
         ("a.txt", b"hello\nworld\n", r"a\.txt"),
         ("a.frd", b"hello\n", "line 1"),
         ("a.dat", b"", "empty"),

@@ -355,3 +355,20 @@ def test_a_table_with_a_row_for_each_place_of_each_case(tmp_path):
         pp.import_results(long_table(tmp_path / "lost.csv", rows[:-1]), LONG)
     with pytest.raises(UsageError, match="one row for each place"):
         pp.import_results(long_table(tmp_path / "twice.csv", [*rows[:-1], rows[0]]), LONG)
+
+
+def test_inputs_that_do_not_vary_or_vary_together_are_refused_by_name(tmp_path):
+    force = np.linspace(1.0, 5.0, 6)
+    columns = {
+        "force [N]": force,
+        "heat [W]": 3 * force - 2,
+        "width [mm]": np.full(6, 4.0),
+        "sag [mm]": force**2,
+    }
+    path = tmp_path / "cases.npz"
+    np.savez(path, **columns)
+    mapping = {"outputs": [{"name": "sag"}]}
+    with pytest.raises(UsageError, match="'force' and 'heat' always vary together"):
+        pp.import_results(path, {**mapping, "inputs": [{"name": "force"}, {"name": "heat"}]})
+    with pytest.raises(UsageError, match="'width' does not vary"):
+        pp.import_results(path, {**mapping, "inputs": [{"name": "force"}, {"name": "width"}]})

@@ -7,7 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from palpate.dataset.readers import array_files, calculix_dat, calculix_frd, comsol, text_tables, vtk_files
+from palpate.dataset.readers import (
+    abaqus_odb,
+    abaqus_report,
+    array_files,
+    calculix_dat,
+    calculix_frd,
+    comsol,
+    febio_records,
+    solver_meshes,
+    text_tables,
+    vtk_files,
+)
 from palpate.dataset.readers.file_text import head_of
 from palpate.dataset.readers.results import Results, refuse
 
@@ -40,6 +51,12 @@ FORMATS = (
     Format("CalculiX results", (".frd",), calculix_frd.read_frd, calculix_frd.is_frd),
     Format("CalculiX printed results", (".dat",), calculix_dat.read_dat, calculix_dat.is_dat),
     Format("COMSOL text export", (".txt", ".csv", ".dat", ".asc"), comsol.read_comsol, comsol.is_comsol),
+    Format("Abaqus report", (".rpt",), abaqus_report.read_report, abaqus_report.is_report),
+    Format("Abaqus output database", (".odb",), abaqus_odb.refuse_odb),
+    Format(
+        "FEBio data record", (".log", ".txt", ".dat"), febio_records.read_records, febio_records.is_record
+    ),
+    Format("Exodus, EnSight, OpenFOAM, CGNS, XDMF", solver_meshes.SUFFIXES, solver_meshes.read_mesh_results),
     Format("VTK files", vtk_files.SUFFIXES, vtk_files.read_vtk),
     Format("NumPy arrays", (".npz",), array_files.read_npz),
     Format("text tables", text_tables.SUFFIXES, text_tables.read_text_table),
@@ -53,8 +70,8 @@ def read_results(path: str | os.PathLike[str]) -> Results:
     Parameters
     ----------
     path : path
-        COMSOL's text exports, CalculiX's ``.frd`` and ``.dat``, ``.vtu``, ``.pvd`` and others of VTK, ``.npz``,
-        ``.parquet`` or a text table.
+        COMSOL's text exports, CalculiX's ``.frd`` and ``.dat``, reports of Abaqus, data records of FEBio, Exodus,
+        EnSight, OpenFOAM, CGNS, XDMF, ``.vtu``, ``.pvd`` and others of VTK, ``.npz``, ``.parquet`` or a text table.
 
     Returns
     -------
@@ -72,7 +89,7 @@ def read_results(path: str | os.PathLike[str]) -> Results:
     if not path.is_file():
         raise refuse(path, None, "there is no such file.", fix="Check the path.")
     suffix, head = path.suffix.lower(), head_of(path)
-    if not head.strip():
+    if not head.strip() and suffix not in solver_meshes.EMPTY:
         raise refuse(path, 1, "the file is empty.", why="The solver printed nothing, or was stopped.")
     near = [form for form in FORMATS if suffix in form.suffixes]
     for form in near:

@@ -16,19 +16,19 @@ from palpate.dataset.assemble import assemble
 from palpate.dataset.dataset import Dataset
 from palpate.dataset.readers.column_choice import chosen_columns
 from palpate.dataset.readers.formats import read_results
-from palpate.dataset.readers.imported_layout import along_axes, body_layout
+from palpate.dataset.readers.imported_layout import along_axes, body_layout, further_places
 from palpate.dataset.readers.load_energies import with_energies
-from palpate.dataset.readers.long_tables import by_case_and_place
+from palpate.dataset.readers.long_tables import by_case_and_axis, by_case_and_place
 from palpate.dataset.readers.mapping import ImportMapping, read_mapping
 from palpate.dataset.readers.results import Column, Results, join_cases, join_columns
 from palpate.dataset.readers.slope_of_energy import contradiction
-from palpate.dataset.schema import Field, conjugate_unit
+from palpate.dataset.schema import Field, Layout, conjugate_unit
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.input_files import read_input
 from palpate.units import Range, parse_quantity
 
-__all__ = ["Imported", "import_results", "read_files"]
+__all__ = ["Imported", "MappedCases", "import_results", "map_cases", "read_files"]
 
 _UNITS = {"displacement": "m", "strain_energy": "J", "potential_energy": "J"}
 
@@ -90,7 +90,7 @@ def import_results(
             why=f"Columns of {results.source} are {', '.join(results.columns)}.",
             fix="Add [[inputs]] and [[outputs]] with a name and the column that each comes from.",
         )
-    results = by_case_and_place(results, wishes)
+    results = by_case_and_axis(by_case_and_place(results, wishes), wishes)
     return _dataset(results, wishes, paths)
 
 
@@ -134,6 +134,52 @@ def _with_numbers_of_names(results: Results, pattern: str) -> Results:
 
 def _dataset(results: Results, mapping: ImportMapping, paths: Sequence[Path]) -> Imported:
     """Return the dataset of results whose mapping is complete."""
+    cases = map_cases(results, mapping)
+    _require_independent(cases)
+    extent = float(np.ptp(cases.layout.rest, axis=0).max()) if len(cases.layout.rest) else 0.0
+    about_slope = contradiction(cases.fields, cases.answers, cases.inputs, cases.ranges, extent)
+    nodal = [field.name for field in cases.fields if "node" in field.dims]
+    finite, count_of_cases = cases.finite, len(cases.inputs)
+    notes = list(cases.notes)
+    if not finite.all():
+        failed = count(int((~finite).sum()), "case")
+        notes.append(f"{failed} without finite answers: marked as not converged.")
+    answers = cases.answers | {
+        "converged": finite,
+        "iterations": np.zeros(count_of_cases, dtype=int),
+        "residual": np.full(count_of_cases, np.nan),
+        "message": np.where(finite, "imported", "the files have no finite answer").astype(object),
+        "solve_seconds": np.full(count_of_cases, np.nan),
+    }
+    notes = list(dict.fromkeys([*notes, *about_slope, *_about_coordinates(results, nodal)]))
+    origin = _provenance(results, mapping, paths, notes)
+    data = assemble(cases.ranges, cases.layout, cases.inputs, answers, origin, schema=cases.fields)
+    return Imported(data, results, tuple(notes))
+
+
+@dataclass(frozen=True, eq=False)
+class MappedCases:
+    """Inputs and answers of results in SI units, as a mapping chose them."""
+
+    ranges: tuple[Range, ...]
+    layout: Layout
+    fields: tuple[Field, ...]
+    inputs: np.ndarray  # (case, n)
+    answers: dict[str, np.ndarray]  # by the name of their field, cases first
+    notes: tuple[str, ...]
+
+    @property
+    def finite(self) -> np.ndarray:
+        """True for each case whose answers are all numbers, shape (case,)."""
+        finite = np.ones(len(self.inputs), dtype=bool)
+        for field in self.fields:
+            values = self.answers[field.name].reshape(len(self.inputs), -1)
+            finite &= np.isfinite(values).all(axis=1)
+        return finite
+
+
+def map_cases(results: Results, mapping: ImportMapping) -> MappedCases:
+    """Return what results hold of the inputs and outputs of a complete mapping."""
     notes = list(results.notes)
     inputs, units = _inputs(results, mapping)
     fields, answers, nodes = _outputs(results, mapping, units)
@@ -143,32 +189,37 @@ def _dataset(results: Results, mapping: ImportMapping, paths: Sequence[Path]) ->
         notes.append(f"Skipped {lost} whose inputs are not all numbers.")
     inputs, answers = inputs[rows], {name: values[rows] for name, values in answers.items()}
     nodal = [field.name for field in fields if "node" in field.dims]
-    layout, kept, about_nodes = body_layout(results, mapping, nodes, {name: answers[name] for name in nodal})
+    further = further_places(results, mapping, {dim for field in fields for dim in field.dims})
+    at_nodes = {name: answers[name] for name in nodal}
+    layout, kept, about_nodes = body_layout(results, mapping, nodes, at_nodes, cells="cells" in further)
+    layout = replace(layout, **further)
     answers |= {name: answers[name][:, kept] for name in nodal}
     fields = [replace(field, shape=tuple(answers[field.name].shape[1:])) for field in fields]
     ranges = _ranges(mapping, inputs, units)
     weight = bool(mapping.body.get("self_weight"))
     fields, answers, about_energies = with_energies(fields, answers, inputs, ranges, layout, weight)
-    finite = np.ones(len(inputs), dtype=bool)
-    for field in fields:
-        finite &= np.isfinite(answers[field.name].reshape(len(inputs), -1)).all(axis=1)
-    if not finite.all():
-        failed = count(int((~finite).sum()), "case")
-        notes.append(f"{failed} without finite answers: marked as not converged.")
-    extent = float(np.ptp(layout.rest, axis=0).max()) if len(layout.rest) else 0.0
-    about_energies += contradiction(fields, answers, inputs, ranges, extent)
-    answers |= {
-        "converged": finite,
-        "iterations": np.zeros(len(inputs), dtype=int),
-        "residual": np.full(len(inputs), np.nan),
-        "message": np.where(finite, "imported", "the files have no finite answer").astype(object),
-        "solve_seconds": np.full(len(inputs), np.nan),
-    }
-    notes = list(dict.fromkeys([*notes, *about_nodes, *about_energies, *_about_coordinates(results, nodal)]))
-    data = assemble(
-        ranges, layout, inputs, answers, _provenance(results, mapping, paths, notes), schema=fields
+    return MappedCases(
+        ranges, layout, tuple(fields), inputs, answers, (*notes, *about_nodes, *about_energies)
     )
-    return Imported(data, results, tuple(notes))
+
+
+_TOGETHER = 1e-9  # what the correlation of two inputs that always vary together misses to one
+
+
+def _require_independent(cases: MappedCases) -> None:
+    """Refuse two inputs that always vary together: what each of them does can't be told."""
+    if len(cases.inputs) < 3:
+        return
+    correlation = np.abs(np.corrcoef(cases.inputs.T)).reshape(len(cases.ranges), -1)
+    for i, j in zip(*np.triu_indices(len(cases.ranges), 1), strict=True):
+        if correlation[i, j] > 1 - _TOGETHER:
+            names = cases.ranges[i].name, cases.ranges[j].name
+            raise UsageError(
+                f"The inputs {names[0]!r} and {names[1]!r} always vary together.",
+                why=f"In all {len(cases.inputs)} cases one is a straight line over the other, so the answers don't "
+                "tell what each of them does.",
+                fix=f"Leave {names[1]!r} out of the inputs, or import cases in which they vary apart.",
+            )
 
 
 def _inputs(results: Results, mapping: ImportMapping) -> tuple[np.ndarray, list[str]]:
@@ -208,34 +259,45 @@ def _outputs(
                 f"The components of {entry.name!r} belong to different places.",
                 fix="Choose components of one kind of places.",
             )
-        if where and not results.places[where].nodal:
-            raise UsageError(
-                f"The output {entry.name!r} has a value for each of the {where}, which are no nodes.",
-                fix='Take a quantity at nodes, or one number: reduce = "max".',
-            )
-        if where and nodes and where != nodes:
+        dim = _dimension(results, where, entry.name, mapping)
+        if dim == "node" and nodes and where != nodes:
             raise UsageError(
                 f"The output {entry.name!r} belongs to {where!r}, others to {nodes!r}.",
                 why="A dataset has one set of nodes.",
                 fix="Choose columns of one set, or single places by `at`.",
             )
-        nodes = nodes or where
+        nodes = nodes or (where if dim == "node" else "")
         values = np.stack([column.values for column in found], axis=-1)
-        if entry.name == "displacement" and where:
+        if entry.name == "displacement" and dim == "node":
             values = along_axes(results, mapping, values)
         meaning = entry.meaning or f"from {', '.join(column.name for column in found)}"
-        field, answers[entry.name] = _field(
-            Field(entry.name, unit=unit, meaning=meaning), values, units, bool(where)
-        )
+        field, answers[entry.name] = _field(Field(entry.name, unit=unit, meaning=meaning), values, units, dim)
         fields.append(field)
     return fields, answers, nodes
 
 
-def _field(field: Field, values: np.ndarray, units: Sequence[str], nodal: bool) -> tuple[Field, np.ndarray]:
-    """Return a field with its dimensions, and its values (case, node, k) or (case, k), without k where it is 1."""
-    if field.name == "displacement" and nodal:
+def _dimension(results: Results, where: str, name: str, mapping: ImportMapping) -> str:
+    """Return the dataset's dimension of the places that an output has values at; "" of one number a case."""
+    if not where:
+        return ""
+    places = results.places[where]
+    if places.axis:
+        return mapping.axis
+    if places.nodal:
+        return "node"
+    if where == "cells" and places.coordinates:
+        return "cell"
+    raise UsageError(
+        f"The output {name!r} has a value for each of the {where}, whose places the files do not tell.",
+        fix='Take a quantity at nodes or cells, or one number: reduce = "max".',
+    )
+
+
+def _field(field: Field, values: np.ndarray, units: Sequence[str], dim: str) -> tuple[Field, np.ndarray]:
+    """Return a field with its dimensions, and its values (case, place, k) or (case, k), without k where it is 1."""
+    if field.name == "displacement" and dim == "node":
         return replace(field, dims=("node", "component"), shape=values.shape[1:]), values
-    if field.name == "response" and not nodal:
+    if field.name == "response" and not dim:
         if values.shape[1] != len(units):
             raise UsageError(
                 f"The response has {values.shape[1]} components for {count(len(units), 'input')}.",
@@ -243,7 +305,7 @@ def _field(field: Field, values: np.ndarray, units: Sequence[str], nodal: bool) 
             )
         unit = ", ".join(map(conjugate_unit, units))
         return replace(field, dims=("input",), shape=values.shape[1:], unit=unit), values
-    dims: tuple[str, ...] = ("node",) if nodal else ()
+    dims: tuple[str, ...] = (dim,) if dim else ()
     if values.shape[-1] == 1:
         values = values[..., 0]
     else:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from palpate.dataset.readers.column_choice import index_of_place, places_in_metres
 from palpate.dataset.readers.mapping import ImportMapping, Load, Nodes
+from palpate.dataset.readers.result_units import values_in_si
 from palpate.dataset.readers.results import Places, Results
 from palpate.dataset.schema import Layout
 from palpate.errors import UsageError
 from palpate.format import count
 
-__all__ = ["along_axes", "body_layout"]
+__all__ = ["along_axes", "body_layout", "further_places"]
 
 _REST = "surface"  # name of the triangles that belong to no surface of the mapping
 _SAME = 1e-6  # distance over the body's size that is rounding of coordinates printed with six digits
@@ -54,14 +56,22 @@ def _index(axis: str, axes: Sequence[str], where: str) -> int:
 
 
 def body_layout(
-    results: Results, mapping: ImportMapping, nodes: str, answers: Mapping[str, np.ndarray]
+    results: Results,
+    mapping: ImportMapping,
+    nodes: str,
+    answers: Mapping[str, np.ndarray],
+    *,
+    cells: bool = False,
 ) -> tuple[Layout, np.ndarray, list[str]]:
     """Return the layout of a body, the indices of the nodes that are kept, and sentences about the others.
 
     `nodes` names the nodes that fields belong to; empty where there are none: the body is then one point. `answers` are
-    the fields (case, node, …) at these nodes; a node without a number in any case is left out.
+    the fields (case, node, …) at these nodes; a node without a number in any case is left out. With `cells` the mesh is
+    kept whole, for fields at its cells.
     """
     loads = [entry.load for entry in mapping.inputs if entry.load is not None]
+    if cells and not nodes:
+        nodes = next((name for name, places in results.places.items() if places.nodal), "")
     if not nodes:
         if loads:
             raise UsageError(
@@ -81,7 +91,8 @@ def body_layout(
     kept, notes = _kept_nodes(places, points, answers, mapping.nodes or Nodes())
     rest = points[kept][:, [every.index(axis) for axis in chosen]]
     triangles, surface_of = None, None
-    if places.triangles is not None and len(chosen) == 3:
+    plane = len(chosen) == 2 and not loads and not mapping.interactions and not mapping.surfaces
+    if places.triangles is not None and (len(chosen) == 3 or plane):
         triangles, surface_of = _surface(places, points, kept, mapping.surfaces)
     if loads and len(loads) < len(mapping.inputs):
         raise UsageError(
@@ -99,6 +110,26 @@ def body_layout(
         labels={},
     )
     return layout, kept, notes
+
+
+def further_places(results: Results, mapping: ImportMapping, dims: Collection[str]) -> dict[str, Any]:
+    """Return the cells and the axis that outputs with these dimensions have values at, as a `Layout` takes them."""
+    more: dict[str, Any] = {}
+    if mapping.axis and mapping.axis in dims:
+        column = next(iter(results.places["axis"].coordinates.values()))
+        values, unit = values_in_si(column, mapping.units)
+        more["scales"] = {mapping.axis: (values, unit)}
+    if "cell" in dims:
+        if mapping.nodes is not None:
+            raise UsageError(
+                "Fields at cells are of the whole mesh.", fix="Leave `nodes` out of the mapping."
+            )
+        places = results.places["cells"]
+        chosen, every = _axes(results, mapping)
+        middles = places_in_metres(results, places, mapping)[:, [every.index(axis) for axis in chosen]]
+        cell_of = np.zeros(0, np.int64) if places.cell_of is None else places.cell_of
+        more["cells"] = middles, cell_of
+    return more
 
 
 def _kept_nodes(

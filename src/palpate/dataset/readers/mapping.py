@@ -108,6 +108,8 @@ class ImportMapping(Record):
     file_pattern : str
         Regular expression with named groups, such as ``F(?P<force>[0-9.]+)``: numbers in the names of files, which
         become columns.
+    axis : str
+        Column that runs along curves, such as ``time``: rows of equal inputs are one case, and outputs curves along it.
     nodes : Nodes, optional
         Nodes that are kept; all by default.
     surfaces : mapping of name to coordinates
@@ -128,6 +130,7 @@ class ImportMapping(Record):
     coordinates: tuple[str, ...] | None = None
     join: Literal["stem", "columns", "cases"] = "stem"
     file_pattern: str = ""
+    axis: str = ""
     nodes: Nodes | None = None
     surfaces: dict[str, dict[str, Metres]] = Field(default_factory=dict)
     mirrored: bool = False

@@ -63,12 +63,18 @@ class Places:
         Outer surface, as indices of places, counter-clockwise seen from outside.
     nodal : bool
         True for nodes, whose coordinates another file of the same model may have.
+    cell_of : (t,) array of int, optional
+        Of cells: for each triangle of the nodes' surface the cell that it belongs to.
+    axis : bool
+        True for points of an axis, such as times, along which a case has curves.
     """
 
     ids: np.ndarray
     coordinates: Mapping[str, Column] = field(default_factory=dict)
     triangles: np.ndarray | None = None
     nodal: bool = True
+    cell_of: np.ndarray | None = None
+    axis: bool = False
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -295,7 +301,7 @@ def join_cases(parts: Sequence[Results]) -> Results:
         " and ".join(dict.fromkeys(part.format for part in parts)),
         sum(part.cases for part in parts),
         columns,
-        {name: value for name, value in first.places.items() if name in used},
+        {name: value for name, value in first.places.items() if name in used or value.nodal},
         (*notes, *left_out),
     )
 

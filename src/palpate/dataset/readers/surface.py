@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-__all__ = ["outer_surface"]
+__all__ = ["cells_of_triangles", "outer_surface"]
 
 # faces of each kind of cell by its corner nodes, counter-clockwise seen from outside, in VTK's order of nodes
 _FACES: dict[str, tuple[tuple[int, ...], ...]] = {
@@ -50,6 +50,28 @@ def outer_surface(cells: Iterable[tuple[str, np.ndarray]], points: np.ndarray) -
         triangles += [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]
     joined = np.concatenate(triangles) if triangles else np.empty((0, 3), dtype=np.int64)
     return joined.astype(np.int64) if len(joined) else None
+
+
+def cells_of_triangles(
+    cells: Iterable[tuple[str, np.ndarray, np.ndarray]], triangles: np.ndarray
+) -> np.ndarray | None:
+    """Return the cell (t,) that each triangle (t, 3) of the surface belongs to; None where one belongs to none.
+
+    Each entry of `cells` has a kind, its nodes (e, k) and the numbers (e,) of its cells.
+    """
+    parts, owners = [np.sort(triangles, axis=1)], []
+    for kind, nodes, numbers in cells:
+        for face in _FACES.get(kind, ()):
+            corners = np.asarray(nodes)[:, face]
+            for three in ((0, 1, 2),) if len(face) == 3 else ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3)):
+                parts.append(np.sort(corners[:, three], axis=1))
+                owners.append(numbers)
+    _, number = np.unique(np.concatenate(parts), axis=0, return_inverse=True)
+    number, own = number.ravel()[: len(triangles)], number.ravel()[len(triangles) :]
+    cell_of = np.full(int(number.max(initial=-1)) + 1 + len(own), -1)
+    cell_of[own] = np.concatenate(owners) if owners else own
+    found = cell_of[number]
+    return None if (found < 0).any() else np.asarray(found)
 
 
 def _single(faces: np.ndarray) -> np.ndarray:

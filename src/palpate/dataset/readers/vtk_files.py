@@ -8,6 +8,7 @@ crash it, and packed numbers may take any memory.
 from __future__ import annotations
 
 import importlib.util
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,19 +18,32 @@ from xml.etree import ElementTree
 import numpy as np
 
 from palpate.dataset.readers.results import TIME, Column, Places, Results, refuse
-from palpate.dataset.readers.surface import outer_surface
+from palpate.dataset.readers.surface import CORNERS, cells_of_triangles, outer_surface
 from palpate.errors import FileFormatError, UsageError
 from palpate.input_files import DAMAGE, plain_text, read_input
 from palpate.supervised import read_in_child
 
-__all__ = ["SUFFIXES", "Grid", "read_series", "read_vtk", "read_vtu"]
+__all__ = [
+    "INSTALL",
+    "KINDS",
+    "SUFFIXES",
+    "Grid",
+    "cells_of",
+    "damage_error",
+    "read_series",
+    "read_vtk",
+    "read_vtu",
+    "require_one_mesh",
+    "results_of_grids",
+    "sound_grid",
+]
 
 FORMAT = "VTK"
 _LARGEST_SERIES = 50_000_000  # bytes of a list of files
 SUFFIXES = (".pvd", ".vtu", ".vtp", ".vtk")
 INSTALL = "Install PyVista: pip install 'palpate[results]'"
 # VTK's numbers of the cells that have faces; the second of a pair has nodes between the corners
-_KINDS = {
+KINDS = {
     5: "triangle",
     22: "triangle",
     9: "quad",
@@ -55,6 +69,7 @@ class Grid:
 
     points: np.ndarray
     cells: Sequence[tuple[str, np.ndarray]]
+    numbers: Sequence[np.ndarray]  # of the cells of each kind, among all cells
     count: int
     point_data: Mapping[str, np.ndarray]
     cell_data: Mapping[str, np.ndarray]
@@ -67,12 +82,18 @@ def read_vtk(path: Path) -> Results:
     Columns are called as the array, of a vector ``NAME.x``, of a symmetric tensor ``NAME.xx``.
     """
     if path.suffix.lower() != ".pvd":
-        return _collect(path, [_read(path)], None)
+        return results_of_grids(path, [_read(path)], None)
     entries = read_series(path)
     times = np.array([_time(path, time) for time, _ in entries])
     order = np.argsort(times, kind="stable")
     times, files = times[order], [entries[i][1] for i in order]
     grids = [_read(file) for file in files]
+    require_one_mesh(files, grids)
+    return results_of_grids(path, grids, times)
+
+
+def require_one_mesh(files: Sequence[Path], grids: Sequence[Grid]) -> None:
+    """Refuse steps whose nodes are others, or elsewhere, than in the first; the files are those of the steps."""
     for file, grid in zip(files, grids, strict=True):
         if grid.points.shape != grids[0].points.shape or grid.count != grids[0].count:
             raise refuse(
@@ -91,7 +112,6 @@ def read_vtk(path: Path) -> Results:
                 why="The coordinates are those of the deformed body, or of another mesh.",
                 fix="Export the undeformed mesh, with the displacement as a field.",
             )
-    return _collect(path, grids, times)
 
 
 def _time(path: Path, text: str) -> float:
@@ -149,20 +169,28 @@ def _read_with_pyvista(path: Path) -> Grid:
         reader.reader.AddObserver("ErrorEvent", lambda *_: faults.append("VTK reports an error"))
         grid: Any = reader.read()
         whole = grid.cast_to_unstructured_grid()
-        cells = [(_KINDS[kind], nodes) for kind, nodes in whole.cells_dict.items() if kind in _KINDS]
+        cells, numbers = cells_of(whole)
     except DAMAGE as error:
-        raise _damage_error(path, str(error)) from error
+        raise damage_error(path, str(error)) from error
     if faults or not whole.n_points:
-        raise _damage_error(path, faults[0] if faults else "it has no nodes")
-    return _sound(
+        raise damage_error(path, faults[0] if faults else "it has no nodes")
+    return sound_grid(
         path,
         np.asarray(whole.points, dtype=float),
         cells,
+        numbers,
         int(whole.n_cells),
         dict(whole.point_data.items()),
         dict(whole.cell_data.items()),
         dict(whole.field_data.items()),
     )
+
+
+def cells_of(whole: Any) -> tuple[list[tuple[str, np.ndarray]], list[np.ndarray]]:
+    """Return the known cells of an unstructured grid by kind, and their numbers among all its cells."""
+    kinds = [kind for kind in whole.cells_dict if kind in KINDS]
+    cells = [(KINDS[kind], whole.cells_dict[kind]) for kind in kinds]
+    return cells, [np.flatnonzero(whole.celltypes == kind) for kind in kinds]
 
 
 def _read_with_meshio(path: Path) -> Grid:
@@ -172,40 +200,46 @@ def _read_with_meshio(path: Path) -> Grid:
     try:
         mesh = vtu.read(path)
     except (meshio.ReadError, *DAMAGE) as error:
-        raise _damage_error(
+        raise damage_error(
             path, f"{error or 'meshio does not know its coding'}", f"{INSTALL}, or export it again."
         ) from error
     kinds = [(block.type.rstrip("0123456789"), block.data) for block in mesh.cells]
     cell_data = {name: np.concatenate(values) for name, values in mesh.cell_data.items()}
-    count = sum(len(block.data) for block in mesh.cells)
+    ends = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+    count, numbers = int(ends[-1]), [np.arange(a, b) for a, b in itertools.pairwise(ends)]
     points = np.asarray(mesh.points, dtype=float)
-    return _sound(path, points, kinds, count, mesh.point_data, cell_data, mesh.field_data)
+    return sound_grid(path, points, kinds, numbers, count, mesh.point_data, cell_data, mesh.field_data)
 
 
-def _sound(
+def sound_grid(
     path: Path,
     points: np.ndarray,
     cells: Sequence[tuple[str, np.ndarray]],
+    numbers: Sequence[np.ndarray],
     count: int,
     *data: Mapping[str, Any],
 ) -> Grid:
     """Return the content of a file whose cells name nodes that are there; names of arrays are plain texts."""
     for kind, nodes in cells:
         if nodes.size and not (nodes.min() >= 0 and nodes.max() < len(points)):
-            raise _damage_error(path, f"a {kind} names a node that is not among its {len(points)}")
+            raise damage_error(path, f"a {kind} names a node that is not among its {len(points)}")
     if points.ndim != 2 or not np.isfinite(points).all():
-        raise _damage_error(path, "coordinates of nodes are no finite numbers")
+        raise damage_error(path, "coordinates of nodes are no finite numbers")
     plain = [{plain_text(str(name)): np.array(values) for name, values in arrays.items()} for arrays in data]
-    return Grid(np.array(points), [(kind, np.array(nodes)) for kind, nodes in cells], count, *plain)
+    return Grid(
+        np.array(points), [(kind, np.array(nodes)) for kind, nodes in cells], list(numbers), count, *plain
+    )
 
 
-def _damage_error(path: Path, why: str, fix: str = "") -> FileFormatError:
+def damage_error(path: Path, why: str, fix: str = "") -> FileFormatError:
+    """Return the error of a file that its reader in C++ can't read."""
     return refuse(
         path, None, "the file can't be read.", why=f"It is damaged, cut short or foreign: {why}.", fix=fix
     )
 
 
-def _collect(path: Path, grids: Sequence[Grid], times: np.ndarray | None) -> Results:
+def results_of_grids(path: Path, grids: Sequence[Grid], times: np.ndarray | None) -> Results:
+    """Return the content of grids of one mesh as results, each a case; `times` (case,) are those of a series."""
     first = grids[0]
     columns = [] if times is None else [Column(TIME, times, None, "{time}")]
     notes: list[str] = []
@@ -229,14 +263,28 @@ def _collect(path: Path, grids: Sequence[Grid], times: np.ndarray | None) -> Res
         axis: Column(axis, first.points[:, i], None, "{length}")
         for i, axis in enumerate("xy" if plane and len(first.points) > 1 else "xyz")
     }
+    triangles = outer_surface(first.cells, first.points)
     places = {
-        "nodes": Places(np.arange(len(first.points)), coordinates, outer_surface(first.cells, first.points)),
-        "cells": Places(np.arange(first.count), nodal=False),
+        "nodes": Places(np.arange(len(first.points)), coordinates, triangles),
+        "cells": _cells(first, triangles, tuple(coordinates)),
     }
     used = {column.places for column in columns} | {"nodes"}
     places = {name: value for name, value in places.items() if name in used}
     form = f"{FORMAT} {path.suffix}"
     return Results.of(path, form, len(grids), columns, places, notes)
+
+
+def _cells(grid: Grid, triangles: np.ndarray | None, axes: Sequence[str]) -> Places:
+    """Return the cells of a file with their middles, and the cell of each triangle of the surface."""
+    blocks = [
+        (*block, own) for block, own in zip(grid.cells, grid.numbers, strict=True) if block[0] in CORNERS
+    ]
+    middles = np.full((grid.count, grid.points.shape[1]), np.nan)
+    for kind, nodes, own in blocks:
+        middles[own] = grid.points[nodes[:, : CORNERS[kind]]].mean(axis=1)
+    columns = {axis: Column(axis, middles[:, i], None, "{length}") for i, axis in enumerate(axes)}
+    owners = None if triangles is None else cells_of_triangles(blocks, triangles)
+    return Places(np.arange(grid.count), columns, nodal=False, cell_of=owners)
 
 
 def _reason_to_skip(name: str, sample: Any, arrays: Sequence[Mapping[str, Any]]) -> str:

@@ -30,12 +30,12 @@ from palpate.learning.arrays.compared_rows import ComparedRows
 from palpate.learning.arrays.fit_notes import notes_on
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.held_out import HeldOut
-from palpate.learning.arrays.influence import Influence
 from palpate.learning.arrays.members import ROWS, Crossed, CrossedLayers
 from palpate.learning.ensemble import Ensemble
 from palpate.learning.kernel_layer import KernelLayer, Metric
 from palpate.learning.search import Trial
 from palpate.network import Network, TrainedRegion
+from palpate.network.influence import Influence
 from palpate.network.radial import RadialFunction
 from palpate.network.uncertainty import Uncertainty
 from palpate.rbf.refinement.refine import Refined
@@ -321,5 +321,8 @@ class Finish:
         )
         notes = notes_on(self.samples, self.problem, fitted, evidence.missed, rows, self.scales)
         wanted = self.samples.Y[rows]
-        comparison = ComparedRows(wanted, wanted - evidence.missed * self.problem.scaling.output_scale)
+        scale, sure = self.problem.scaling.output_scale, fitted.uncertainty
+        spread = np.ones(len(rows)) if M is None else evidence.spread
+        deviation = np.sqrt(spread[:, None] * sure.noise) * sure.factor * scale
+        comparison = ComparedRows(wanted, wanted - evidence.missed * scale, deviation=deviation)
         return replace(fitted, notes=notes, comparison=comparison)

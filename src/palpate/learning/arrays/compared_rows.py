@@ -25,6 +25,7 @@ class ComparedRows:
     measured: np.ndarray
     answered: np.ndarray
     words: str = "answers at rows before they were learnt"  # what the answers are
+    deviation: np.ndarray | None = None  # (J, m), calibrated standard deviation of these answers
 
     def plot(self, outputs: Sequence[Quantity], title: str, path: str | os.PathLike[str] | None) -> Any:
         """Return a figure of answers over what was measured, a panel for each output, saved where a path is given."""

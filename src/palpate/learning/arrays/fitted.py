@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -14,16 +14,16 @@ from palpate.errors import FileFormatError, UsageError
 from palpate.format import duration, share
 from palpate.learning.arrays.array_samples import points
 from palpate.learning.arrays.compared_rows import ComparedRows, check_outputs
-from palpate.learning.arrays.influence import Influence
 from palpate.learning.search import Trial
 from palpate.network import Network, TrainedRegion
+from palpate.network.influence import Influence
 from palpate.network.uncertainty import Uncertainty
+from palpate.surrogates import LearntQuantities, Surrogate
 from palpate.surrogates.model_card import ModelCard, card_of
 
 __all__ = ["Fitted"]
 
 _SHOWN = 5  # of what was tried
-_ASTRAY = 3.0  # calibrated deviations that members may be apart where they are trusted
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,17 +109,30 @@ class Fitted:
         UsageError
             If X has the wrong shape.
         """
-        return self._shaped(self._deviation(self._points(X)))
+        return self._shaped(self._learnt.deviation(self._points(X)))
 
-    def _deviation(self, X: np.ndarray) -> np.ndarray:
-        """Return the calibrated deviation (N, m); the members' disagreement where that is more."""
-        return np.asarray(np.maximum(self.uncertainty.deviation(X), self.disagreement(X)))
+    @cached_property
+    def _learnt(self) -> LearntQuantities:
+        """The network with its uncertainty and region, as a surrogate keeps it."""
+        parts = (self.network, self.uncertainty, self.region, self.members, self.influence, self.level)
+        return LearntQuantities(*parts)
 
-    def disagreement(self, X: np.ndarray) -> np.ndarray:
-        """Return the standard deviation (N, m) of the members' answers at X (N, n); zero for a single network."""
-        if not self.members:
-            return np.zeros((len(X), len(self.network.outputs)))
-        return np.asarray(np.std([member.predict(X) for member in self.members], axis=0))
+    def surrogate(self, name: str = "") -> Surrogate:
+        """Return the network as a surrogate with quantities: what exports, pages and `palpate.load` take.
+
+        Parameters
+        ----------
+        name : str
+            Its name, for record and page; by default those of its outputs.
+        """
+        outputs = [q.name for q in self.network.outputs]
+        network = self._with_record()
+        learnt = replace(
+            self._learnt, network=network, uncertainty=replace(self.uncertainty, network=network)
+        )
+        meta = {**network.meta, "samples": self.network.meta.get("training", {}).get("samples")}
+        meta = {k: v for k, v in meta.items() if v is not None} | {"name": name or ", ".join(outputs[:3])}
+        return Surrogate(meta=meta, quantities={outputs[0] if len(outputs) == 1 else "outputs": learnt})
 
     def interval(self, X: Any, level: float | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return lower and upper bounds (N, m) for what would be measured at X (N, n), output by output.
@@ -139,12 +152,8 @@ class Fitted:
         UsageError
             If X has the wrong shape, or the level is no probability.
         """
-        level = self.level if level is None else level
-        X = self._points(X)
-        low, high = self.uncertainty.interval(X, level)
-        half, middle = (high - low) / 2.0, (high + low) / 2.0
-        half = np.maximum(half, NormalDist().inv_cdf((1.0 + level) / 2.0) * self.disagreement(X))
-        return self._shaped(middle - half), self._shaped(middle + half)
+        low, high = self._learnt.interval(self._points(X), level)
+        return self._shaped(low), self._shaped(high)
 
     def trusted(self, X: Any) -> np.ndarray:
         """Return which of X (N, n) are like the training samples, (N,) bool.
@@ -157,14 +166,7 @@ class Fitted:
         UsageError
             If X has the wrong shape.
         """
-        X = self._points(X)
-        far = self.region.distances(self.network.scaling.scale_inputs(X))
-        apart = self.disagreement(X)
-        if self.influence is not None:
-            apart = np.maximum(apart, self.influence.deviation(self.network, X))
-        agree = (apart <= _ASTRAY * self.uncertainty.deviation(X)).all(axis=1)
-        # written so that a point that is not a number is not trusted
-        return np.asarray((far <= self.region.radius) & agree)
+        return self._learnt.trusted(self._points(X))
 
     def score(self, X: Any, Y: Any) -> float:
         """Return the coefficient of determination R², mean of the outputs, as scikit-learn's regressors do.

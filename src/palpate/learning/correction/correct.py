@@ -149,7 +149,7 @@ def correct(
     """
     options["parameters"] = parameters
     corrector = Corrector(surrogate, **options)
-    baseline = surrogate.energy.baseline
+    baseline = surrogate.hand_energy.baseline
     own, surface = baseline.radius_input, baseline.surface
     assert surface is not None
     measured = probe_positions(
@@ -240,7 +240,7 @@ def _summary(
     done = Correction(
         after,
         before,
-        force_error(after.energy, X, force, along),
+        force_error(after.hand_energy, X, force, along),
         left_out,
         counts,
         corrector.offset,
@@ -313,7 +313,7 @@ def _left_out(surrogate: Surrogate, measured: Measurements, options: Mapping[str
     for fold in range(_FOLDS):
         corrector = Corrector(surrogate, **options)
         _observe(corrector, measured, np.flatnonzero(turn != fold))
-        energy, out = corrector.surrogate.energy, turn == fold
+        energy, out = corrector.surrogate.hand_energy, turn == fold
         predicted[out], depth[out] = energy.force(X[out]), energy.depth(X[out])
     return force_error((predicted, depth), X, force, measured.along)
 

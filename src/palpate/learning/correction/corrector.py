@@ -112,7 +112,9 @@ class Corrector:
         window: int = 500,
         memory: float | None = None,
     ) -> None:
-        if not (isinstance(surrogate, Surrogate) and isinstance(surrogate.energy.baseline, ContactBaseline)):
+        if not (
+            isinstance(surrogate, Surrogate) and isinstance(surrogate.hand_energy.baseline, ContactBaseline)
+        ):
             raise UsageError(
                 f"{surrogate!r:.60} can't be corrected.",
                 why="Measured forces correct a body that a probe presses.",
@@ -132,9 +134,9 @@ class Corrector:
                 fix="Give positive numbers.",
             )
         energy = (
-            surrogate.energy
+            surrogate.hand_energy
             if "correction" in surrogate.meta
-            else add_broad_units(surrogate.energy, discrepancy)
+            else add_broad_units(surrogate.hand_energy, discrepancy)
         )
         self.body, self.model, self.noise, self.gate = surrogate, energy, noise, gate
         self.counts: Counter[str] = Counter()

@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 from palpate.errors import UsageError
 from palpate.format import millimetres
 from palpate.physics.shapes.meshing import split_triangles
-from palpate.physics.shapes.surface_repair import Surface
+from palpate.physics.shapes.surface_repair import SAME, Surface, unite_points
 
 __all__ = ["Moved", "wrap_surface"]
 
@@ -54,7 +54,8 @@ def wrap_surface(surface: Surface, size: float) -> tuple[Surface, Moved]:
     Names of parts are lost. What is thinner than about `size`, and gaps narrower than that, may vanish.
     """
     h = size / 2
-    closed = _close_holes(surface.points, surface.triangles)
+    node = unite_points(surface.points, SAME * surface.length)  # some formats have no shared corners
+    closed = _close_holes(surface.points, node[surface.triangles])
     low = closed.min(axis=(0, 1)) - _BORDER * h
     shape = np.ceil((closed.max(axis=(0, 1)) + _BORDER * h - low) / h).astype(int) + 1
     if shape.prod() > MOST_NODES:
@@ -74,10 +75,23 @@ def wrap_surface(surface: Surface, size: float) -> tuple[Surface, Moved]:
         )
     points, triangles = _march(inside, low, h)
     points = _smooth(points, triangles)
+    _require_whole(points, closed, size)
     moved = _moved(points, triangles, samples, h)
     note = f"It was wrapped, {millimetres(size)} fine: {moved}."
     wrapped = Surface(points, triangles, np.zeros(len(triangles), dtype=np.int64), notes=surface.notes)
     return replace(wrapped, notes=(*surface.notes, note)), moved
+
+
+def _require_whole(points: np.ndarray, corners: np.ndarray, size: float) -> None:
+    """Refuse a wrap whose box is not that of the surface: the flood came in, and a part is gone."""
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    gap = float(max(np.abs(points.min(axis=0) - low).max(), np.abs(points.max(axis=0) - high).max()))
+    if gap > 2 * size:
+        raise UsageError(
+            f"The wrap misses a part of the surface, {millimetres(gap)} at an end.",
+            why=f"It is open wider than {millimetres(size)} there, thinner than that, or a piece of its own.",
+            fix="Wrap by another size, or close the opening in the program that made the file.",
+        )
 
 
 def _close_holes(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from palpate.validation.figures.answer_errors import answer_errors
 from palpate.validation.figures.by_load import network_outputs, shape_by_load, stiffness_by_load, work_by_load
 from palpate.validation.figures.coverage import coverage
 from palpate.validation.figures.displayed_shape import displayed_shape
@@ -41,5 +42,6 @@ FIGURES: tuple[tuple[str, Callable[[Subject], Figure | str | None]], ...] = (
     ("mesh", mesh_error),
     ("worst", worst_of_test),
     ("histories", history_following),
+    ("answers", answer_errors),
 )
 """All figures by the names that they have in a `Validation`, in the order in which they are told."""

@@ -178,7 +178,7 @@ def work_by_load(subject: Subject) -> LoopWork | str | None:
     model, test, samples = subject.loads, subject.data, subject.samples
     if model is None or test is None or samples is None:
         return None
-    D, energy = model.energy.baseline.directions, model.energy
+    D, energy = model.hand_energy.baseline.directions, model.hand_energy
     if len(D) == 1:
         return "Work around closed paths is zero by construction: the hand moves along one coordinate."
 
@@ -231,8 +231,8 @@ def stiffness_errors(model: Surrogate, test: Dataset) -> StiffnessErrors | str:
     if curve is None:
         return "Stiffness is not judged: the test loads lie too far apart to take a slope from."
     rows, slope = curve
-    truth, D = 1.0 / slope, model.energy.baseline.directions[0]
-    answer = -np.einsum("nij,i,j->n", model.energy.stiffness(X[rows]), D, D)
+    truth, D = 1.0 / slope, model.hand_energy.baseline.directions[0]
+    answer = -np.einsum("nij,i,j->n", model.hand_energy.stiffness(X[rows]), D, D)
     return StiffnessErrors.of(np.abs(answer - truth) / np.abs(truth), test.X[rows], test.ranges, METHOD)
 
 

@@ -141,7 +141,7 @@ def follow_unseen(body: Surrogate, test: LoadHistories) -> list[Followed]:
 
 
 def _followed(body: Surrogate, field: NodeField, path: LoadHistory) -> Followed:
-    direction, places = body.energy.baseline.directions[0], path.place[:, None]
+    direction, places = body.hand_energy.baseline.directions[0], path.place[:, None]
     answer = body.follow(places, path.times)
     force = -answer.force @ direction
     shown = field.values(np.stack([path.place, force], axis=1))[:, :, :2]
@@ -151,7 +151,7 @@ def _followed(body: Surrogate, field: NodeField, path: LoadHistory) -> Followed:
         force,
         answer.stored,
         answer.lost,
-        elastic=-body.energy.force(places) @ direction,
+        elastic=-body.hand_energy.force(places) @ direction,
         shape=np.linalg.norm(shown - path.displacement, axis=2),
         residual=float(answer.rest @ direction) if ends else None,
     )

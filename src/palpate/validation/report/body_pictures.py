@@ -33,7 +33,7 @@ def body_pictures(chapter: Chapter, key: str) -> list[Picture]:
     field = model.fields.get("displacement")
     if not isinstance(field, FieldSurrogate) or field.rest.shape[1] != 3:
         return []
-    depths = model.energy.depth(test.X)
+    depths = model.hand_energy.depth(test.X)
     x = test.X[int(np.argmax(depths))]
     moved = field.values(x[None])[0]
     largest = float(np.linalg.norm(moved, axis=1).max())
@@ -52,7 +52,7 @@ def body_pictures(chapter: Chapter, key: str) -> list[Picture]:
 
 def _towards(model: Surrogate, x: np.ndarray) -> np.ndarray:
     """Return the direction (3,) from which the place that inputs (n,) press is seen."""
-    surface = model.energy.baseline.surface
+    surface = model.hand_energy.baseline.surface
     return ASIDE if surface is None else ASIDE + surface.at(np.ascontiguousarray(x[None, :3]))[1][0]
 
 

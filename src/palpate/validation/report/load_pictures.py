@@ -167,11 +167,11 @@ def plot_force(model: Surrogate, data: Dataset, samples: ForceSamples) -> Figure
 
 
 def _draw_curve(axis: Any, model: Surrogate, samples: ForceSamples) -> None:
-    reach, direction = model.energy.inputs[0], model.energy.baseline.directions[0]
+    reach, direction = model.hand_energy.inputs[0], model.hand_energy.baseline.directions[0]
     # the other side is a mirror image where none was solved
     low = max(reach.low, min(0.0, float(samples.hand.min())))
     along = np.linspace(low, reach.high, 200)
-    force = -model.energy.force(along[:, None]) @ direction
+    force = -model.hand_energy.force(along[:, None]) @ direction
     order = np.argsort(samples.hand[:, 0])
     some = order[np.unique(np.linspace(0, order.size - 1, 28).astype(int))]
     axis.plot(1e3 * along, force, color=BLUE, label="network", zorder=1)
@@ -199,7 +199,7 @@ def heading(direction: np.ndarray) -> str:
 
 
 def _draw_parity(axis: Any, model: Surrogate, samples: ForceSamples) -> None:
-    directions, field = model.energy.baseline.directions, model.fields["displacement"]
+    directions, field = model.hand_energy.baseline.directions, model.fields["displacement"]
     assert isinstance(field, NodeField)
     truth, answer = -samples.truth @ directions.T, -samples.answer @ directions.T
     ends = np.array([min(truth.min(), answer.min()), max(truth.max(), answer.max())])

@@ -136,14 +136,14 @@ def outer_picture(chapter: Chapter, key: str) -> Picture:
 def network_rows(model: Surrogate) -> list[tuple[str, str, str]]:
     """Return name, purpose and number of units of each network, in the order of `ROLES`."""
     own = {key: field.network.units for key, field in model.fields.items()} | {
-        "energy": model.energy.network.units
+        "energy": model.hand_energy.network.units
     }
     return [(k, role, str(own[k])) for k, role in ROLES.items() if k in own]
 
 
 def units_of(model: Surrogate, key: str) -> str:
     """Return one network by its name with its number of units, for titles and captions."""
-    network = model.energy.network if key == "energy" else model.fields[key].network
+    network = model.hand_energy.network if key == "energy" else model.fields[key].network
     return f"network “{key}”, {count(network.units, 'unit')}"
 
 

@@ -23,7 +23,7 @@ SMALL, LARGE = 10.0, 70.0  # points², areas of the dots of the shallowest and t
 def place_pictures(chapter: Chapter, key: str) -> list[Picture]:
     """Draw where the ball went; nothing for models that are not touched on a surface."""
     model, test = chapter.model, chapter.subject.solves
-    if test is None or not isinstance(model, Surrogate) or model.energy.baseline.surface is None:
+    if test is None or not isinstance(model, Surrogate) or model.hand_energy.baseline.surface is None:
         return []
     learnt = chapter.learnt_from if chapter.learnt_from.shape[1] == test.X.shape[1] else test.X[:0]
     field = next((f for f in model.fields.values() if isinstance(f, FieldSurrogate)), None)
@@ -36,7 +36,7 @@ def place_pictures(chapter: Chapter, key: str) -> list[Picture]:
             "Where the ball went",
             f"Places of {told} of {chapter.name} on the surface, seen from outside.",
             f"Filled: learnt from. Rings: unseen. The larger, the deeper. There are {told}.",
-            lambda: plot_places(model.energy, learnt, test.X, field),
+            lambda: plot_places(model.hand_energy, learnt, test.X, field),
         )
     ]
 

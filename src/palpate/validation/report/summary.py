@@ -66,6 +66,8 @@ def story(chapter: Chapter) -> Story:
 def _lead(chapter: Chapter) -> str:
     """Return what was judged, how good it is in words of a hand, and what to do, in one paragraph."""
     v = chapter.validation
+    if v.answers is not None:
+        return f"{chapter.name} is judged here by {count(v.samples, 'solve')} that it never saw. {_what_to_do(chapter)}"
     unseen = v.histories.count if v.histories is not None else v.samples
     kind = ("history", "histories") if v.histories is not None else ("finite-element solve",)
     learnt = len(chapter.learnt_from)
@@ -100,11 +102,15 @@ def _what_to_do(chapter: Chapter) -> str:
         return "To do: see below which limits were missed and where; ask for less there, or solve more and learn again."
     if v.caution:
         return f"To do: judge it by more solves before you rely on it. {v.caution}"
+    if v.answers is not None:
+        return "Every limit is kept: it is ready to be asked (`palpate ask`) and exported (`palpate export`)."
     return "Every limit is kept: it is ready to be touched (`palpate view`) and exported (`palpate export`)."
 
 
 def _facts(chapter: Chapter) -> Iterator[Fact]:
     v, subject = chapter.validation, chapter.subject
+    for one in v.answers or ():
+        yield Fact(share(one.p95), f"error of {one.name} over its range, for 95 of 100 values")
     if (line := line_of(chapter.model)) is not None:
         ends = chapter.model.energy.inputs[: len(line.touched)]
         reach = math.hypot(*(max(abs(r.low), abs(r.high)) for r in ends))
@@ -143,6 +149,9 @@ def _solves_in_words(chapter: Chapter) -> str:
     v, subject = chapter.validation, chapter.subject
     if v.histories is not None:
         text = f"{v.histories.count} histories by finite elements that the body never saw, {v.samples} samples in all."
+    elif v.answers is not None:
+        within = ", ".join(interval(r) for r in subject.ranges)
+        text = f"{count(v.samples, 'solve')} that the surrogate never saw, within {within}."
     elif subject.loads is not None:
         text = _solved_by_load(chapter)
     else:
@@ -213,6 +222,8 @@ def _good(v: Validation) -> str:
         )
     if v.histories is not None:
         parts.append(_good_histories(v.histories))
+    elif v.answers is not None:
+        parts += [f"{line[:1].upper()}{line[1:]}." for line in v.answers.lines()]
     elif v.force is not None and v.force.p95 is not None:
         if v.stiffness is not None:
             parts.append(f"The stiffness is off by at most {share(v.stiffness.p95)} for 95 of 100.")

@@ -51,10 +51,10 @@ def touch_pictures(chapter: Chapter, key: str) -> list[Picture]:
         test is None
         or samples is None
         or not isinstance(model, Surrogate)
-        or model.energy.baseline.surface is None
+        or model.hand_energy.baseline.surface is None
     ):
         return []
-    energy = model.energy
+    energy = model.hand_energy
     off = "No touch was strong enough to judge in relative terms."
     if v.force.p95 is not None and v.force.max is not None:
         off = f"95 of 100 forces are within {share(v.force.p95)}, all within {share(v.force.max)}."

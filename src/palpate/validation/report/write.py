@@ -12,6 +12,7 @@ from palpate.errors import UsageError
 from palpate.files import system_errors, writing
 from palpate.format import bind_units
 from palpate.output_files import free_path, with_seal
+from palpate.validation.report.answer_pictures import answer_pictures
 from palpate.validation.report.body_pictures import body_pictures
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.hand_pictures import hand_pictures
@@ -33,6 +34,7 @@ __all__ = ["pictures", "render", "report_context", "write_report"]
 TITLE = "What the hand will feel"
 
 PICTURES: tuple[Callable[[Chapter, str], list[Picture]], ...] = (
+    answer_pictures,
     load_pictures,
     place_pictures,
     touch_pictures,

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.network import Network, Scaling
+from palpate.network.network import Network, Scaling
 from palpate.units import Quantity
 
 __all__ = ["Influence"]

@@ -187,7 +187,7 @@ def learn(
     if known is None:
         _refuse_options(further)
         return _learn_answers(train, name, options, log)
-    log(f"energy of {count(solves, 'solve')}")
+    log(f"learning the energy of {count(solves, 'solve')}")
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
 
     def limit(share: float) -> float | None:
@@ -203,7 +203,7 @@ def learn(
     learnt: dict[str, LearntField] = {}
     for i, shown in enumerate(fields):
         assert known.learn_field is not None
-        log("shape" if shown == "displacement" else "stress")
+        log("learning the shape" if shown == "displacement" else "learning the stress")
         searches = vars(options) | {"seconds": limit(1.0 / (len(fields) - i))}
         learnt[shown] = known.learn_field(FieldOptions(name=shown, unit=_SHOWN[shown][1], **searches))
     # a region by the paint does not remember where it was solved; a validation asks for it

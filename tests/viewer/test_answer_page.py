@@ -177,8 +177,9 @@ def test_every_colouring_is_drawn(plate_page: tuple[Page, list[str], Surrogate])
     assert_no(complaints)
 
 
+@pytest.mark.full
 def test_a_learnt_table_shows_numbers_and_a_response(browser: Browser, tmp_path):
-    X = np.random.default_rng(0).uniform(0.0, 1.0, (60, 2))
+    X = np.random.default_rng(0).uniform(0.0, 1.0, (40, 2))
     Y = np.stack([np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, X[:, 0] * X[:, 1]], axis=1)
     body = pp.fit(X, Y).surrogate("table")
     page, complaints = opened(browser, export_html(body, tmp_path / "table.html").file.as_uri(), offline=True)

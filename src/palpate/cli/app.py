@@ -415,6 +415,7 @@ def _shows_answers(model: Path, *, port: int | None, browser: bool, strict_port:
         return False
     show_answers(
         thing,
+        name=model.stem,
         port=8080 if port is None else port,
         strict_port=strict_port,
         token=token,

@@ -40,13 +40,17 @@ class AnswerPage:
     left_out: tuple[str, ...]
 
     @classmethod
-    def of(cls, surrogate: Surrogate) -> AnswerPage:
-        """Return the page of a surrogate without an energy, with as many of its fields as it has room for."""
+    def of(cls, surrogate: Surrogate, name: str = "") -> AnswerPage:
+        """Return the page of a surrogate without an energy, with as many of its fields as it has room for.
+
+        `name` is its title where its own record has none.
+        """
+        name = str(surrogate.meta.get("name", "")) or name or surrogate.name
         main = ArrayBlock("answers-main")
         groups = [quantities_facts(group, main) for group in surrogate.quantities.values()]
         low, high = bounds(surrogate.inputs)
         facts: dict[str, Any] = {
-            "name": surrogate.name,
+            "name": name,
             "purpose": surrogate.purpose,
             "inputs": [
                 {"name": r.name, "unit": r.unit, "low": r.low, "high": r.high} for r in surrogate.inputs
@@ -58,7 +62,8 @@ class AnswerPage:
         facts["curves"] = [_curve_facts(f, main) for f in modal if f.is_curve]
         parts: dict[str, str] = {}
         room = LARGEST - sum(map(len, page_statics())) - len(packed(main.to_bytes()))
-        drawn, left_out, meshes = [], [], _Meshes()
+        drawn: list[dict[str, Any]] = []
+        left_out, meshes = [], _Meshes()
         X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
         for shown in modal:
             if shown.is_curve:
@@ -81,7 +86,7 @@ class AnswerPage:
         data = main.to_bytes()
         digest = hashlib.sha256(data).hexdigest()
         parts |= {main.name: packed(data), "answers": packed(json.dumps(facts).encode())}
-        return cls(surrogate.name, parts, card.to_json(), digest, tuple(left_out))
+        return cls(name, parts, card.to_json(), digest, tuple(left_out))
 
     def document(self) -> str:
         """Return the page as one HTML file."""

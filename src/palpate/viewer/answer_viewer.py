@@ -20,12 +20,12 @@ __all__ = ["AnswerViewer", "show_answers"]
 class AnswerViewer(LocalServer):
     """The page of a surrogate that no hand feels, at `url`, while the context lasts.
 
-    The page computes all answers by itself; the server sends it once.
+    The page computes all answers by itself; the server sends it once. `name` is its title where the record has none.
     """
 
-    def __init__(self, surrogate: Surrogate, **server: Unpack[ServerOptions]) -> None:
+    def __init__(self, surrogate: Surrogate, *, name: str = "", **server: Unpack[ServerOptions]) -> None:
         super().__init__(**server)
-        self.page = AnswerPage.of(surrogate)
+        self.page = AnswerPage.of(surrogate, name)
 
     @property
     def caption(self) -> str:
@@ -44,11 +44,12 @@ class AnswerViewer(LocalServer):
 def show_answers(
     surrogate: Surrogate,
     *,
+    name: str = "",
     open_browser: bool = False,
     on_ready: Callable[[AnswerViewer], object] | None = None,
     **server: Unpack[ServerOptions],
 ) -> AnswerViewer:
     """Serve the page of a surrogate without touch until Ctrl-C or SIGTERM; in a notebook, go on at once."""
-    viewer = AnswerViewer(surrogate, **server)
+    viewer = AnswerViewer(surrogate, name=name, **server)
     wait_until_interrupted(viewer, open_browser=open_browser, on_ready=on_ready)
     return viewer

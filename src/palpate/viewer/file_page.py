@@ -73,7 +73,7 @@ def export_html(
     """
     require_outputs([path], endings=(".html", ".htm"), overwrite=overwrite)
     if not surrogate.can_be_touched:
-        answers = AnswerPage.of(surrogate)
+        answers = AnswerPage.of(surrogate, Path(path).stem.removesuffix("-page"))
         file = write_file(Path(path), with_seal(path, answers.document()))
         return ExportedPage(file, answers.hash, None, answers.left_out)
     page = _Page.of(surrogate)

@@ -12,7 +12,6 @@ from palpate.cli.export_commands import export_app
 from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
-from palpate.format import count
 from palpate.number_text import number_list, whole_number
 from palpate.output_files import require_outputs
 
@@ -271,6 +270,7 @@ def _series_of_inputs(
     import numpy as np
 
     from palpate.export.answer_shapes import series_of_answers
+    from palpate.format import count
     from palpate.units import bounds, parse_quantity
 
     over, field = answers

@@ -280,14 +280,19 @@ def to_html(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write one HTML file with the body in it, which is touched in any browser: from disk, without a network."""
+    """Write one HTML file with the model in it, touched or asked in any browser: from disk, without a network."""
+    from palpate.learning.loading import load
+    from palpate.surrogates import Surrogate
     from palpate.viewer.file_page import export_html
 
-    thing, console = _body(file), Console(as_json)
+    loaded, console = load(file), Console(as_json)
+    answers = isinstance(loaded, Surrogate) and not loaded.can_be_touched
+    thing = loaded if isinstance(loaded, Surrogate) and answers else _body(file)
     # NAME.html is the report of `palpate validate`
     path = file.with_name(f"{file.stem}-page.html") if out is None else out
     done = export_html(thing, path, check=not no_check, overwrite=force)
     if done.left_out:
         console.say(f"not in the file: {', '.join(done.left_out)} (5 MB are full, or it is on other nodes)")
     missing = _NOT_INSTALLED.format("wasmtime", "check")
+    missing = "the page computes its answers by itself" if answers else missing
     _print(console, done, [done.file], missing, no_check=no_check)

@@ -32,6 +32,12 @@ export_app = typer.Typer(
 LearntFile = Annotated[
     Path, typer.Argument(help="Model file (.palpate), of [bold]palpate learn[/] or [bold]palpate fit[/].")
 ]
+BodyFile = Annotated[
+    Path,
+    typer.Argument(
+        help="Model file (.palpate) of a body, of [bold]palpate learn[/] or [bold]palpate touch[/]."
+    ),
+]
 Folder = Annotated[
     Path | None, typer.Option(help="Folder for the files. Default: the file's name, beside it.")
 ]
@@ -166,7 +172,7 @@ def to_c(
 
 @export_app.command("lib")
 def to_library(
-    file: LearntFile,
+    file: BodyFile,
     out: Folder = None,
     name: Name = None,
     field: FieldName = None,
@@ -203,7 +209,7 @@ def to_library(
 
 @export_app.command("fmu")
 def to_fmu(
-    file: LearntFile,
+    file: BodyFile,
     out: OutFile = None,
     name: Name = None,
     fmi: Annotated[
@@ -265,7 +271,7 @@ def to_onnx(
 
 @export_app.command("html")
 def to_html(
-    file: LearntFile,
+    file: BodyFile,
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", help="File. Default: NAME-page.html beside the file NAME.palpate."),

@@ -8,6 +8,7 @@ and what the page is told first.
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -120,7 +121,8 @@ class _Page:
         model = PageModel(touchable(surrogate))
         traits = device_traits("page")
         place = model.body.workspace(traits.radius)
-        hello = model.hello(_Settings(place.scale, place.radius, traits.max_force), RATE)
+        most = min(traits.max_force, model.body.meta.get("runtime", {}).get("max_force", math.inf))
+        hello = model.hello(_Settings(place.scale, place.radius, most), RATE)
         if model.body.line is not None:
             return cls._of_line(surrogate, model.body.line, hello)
         assert model.surface is not None

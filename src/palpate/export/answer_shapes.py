@@ -20,7 +20,11 @@ def series_of_answers(surrogate: Surrogate, X: np.ndarray, field: str | None = N
     Of a vector its size colours. A displacement on the same mesh moves the nodes. A UsageError names what can't be
     drawn.
     """
-    drawn = {name: shown for name, shown in surrogate.fields.items() if _has_surface(shown)}
+    drawn = {
+        name: shown
+        for name, shown in surrogate.fields.items()
+        if isinstance(shown, ModalField) and _has_surface(shown)
+    }
     if not drawn or (field is not None and field not in drawn):
         raise UsageError(
             f"{surrogate.name!r} has no {'surface' if field is None else f'field {field!r}'} to draw.",
@@ -57,9 +61,9 @@ def series_of_answers(surrogate: Surrogate, X: np.ndarray, field: str | None = N
     )
 
 
-def _has_surface(shown: object) -> bool:
+def _has_surface(shown: ModalField) -> bool:
     """Return whether a field can be drawn."""
-    if not isinstance(shown, ModalField) or not isinstance(shown.places, MeshPlaces):
+    if not isinstance(shown.places, MeshPlaces):
         return False
     return bool(len(shown.places.triangles)) and (
         shown.places.kind == "nodes" or len(shown.places.cell_of) > 0

@@ -47,7 +47,7 @@ async function open(): Promise<void> {
     ({ surface } = new PackedSurface(facts.drawn.surface, await part("drawn")));
   }
   provide({ surface: async () => surface!, modes: async (field) => fields[field]! });
-  const evaluator = await Evaluator.of(module, blocks.map(words), facts.places?.points.length, nodes && words(nodes));
+  const evaluator = await Evaluator.of(module, blocks.map((block) => words(block)), facts.places?.points.length, nodes && words(nodes));
   const kept = facts.places && new IndentationDrawing(evaluator, hello, surface!, facts.places);
   const line = facts.line && new LineShape(evaluator, facts.line, hello.line!.rest.length);
   const rest = facts.line?.stays ? new MovingRest(evaluator, facts.line.directions[0]!) : null;

@@ -72,12 +72,15 @@ def touch(
         with _no_study_of_refusals(part, choices.name):
             touch_on_page(
                 part.stem,
-                lambda other: _study_on_page(
-                    part, replace(choices, unit=other) if other else choices, notes, console
+                lambda unit, wrap: _study_on_page(
+                    part,
+                    replace(choices, unit=unit or choices.unit, wrap=choices.wrap if wrap is None else wrap),
+                    notes,
+                    console,
                 ),
                 lambda study: _write(part, study, notes),
                 touched,
-                at_once=start,
+                at_once=start or study_file(part, choices.name).exists(),
                 port=port,
                 device=device,
                 recordings=part.parent,

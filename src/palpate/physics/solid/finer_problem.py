@@ -14,6 +14,7 @@ import numpy as np
 
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.shapes.meshing import FineMesh
+from palpate.physics.shapes.naming import joint_name
 
 __all__ = ["FINER", "finer_problem"]
 
@@ -31,14 +32,15 @@ def finer_problem(problem: Any, places: np.ndarray) -> Any:
     base = getattr(problem, "base", problem)
     probe = next(part for part in base.interactions if isinstance(part, SphereProbe))
     wide = base.refinements
-    size = FINER * min(part.element for part in wide if part.surface == probe.touches)
+    met = joint_name(probe.touches, probe.rim)
+    size = FINER * min(part.element for part in wide if part.surface in {met, probe.touches})
     half = REACH * probe.radius
     corners = [np.array([place - half, place + half]) for place in np.asarray(places, dtype=float)[:, :3]]
     near = min(size, NEAR * probe.radius)
     levels = [np.array([*base.body.geometry.rest().corners])]
     levels += [np.array([part.lower, part.upper]) for part in wide if part.lower is not None]
     boxes = [
-        FineMesh(probe.touches, size, *map(tuple, _snapped(box, np.concatenate(levels), near).tolist()))
+        FineMesh(met, size, *map(tuple, _snapped(box, np.concatenate(levels), near).tolist()))
         for box in _joined(corners)
     ]
     finer = replace(base, fine=(*wide, *boxes))

@@ -75,6 +75,7 @@ class UsageError(PalpateError):
 
     exit_code = 2
     refusals: tuple[UsageError, ...] = ()  # where several are told at once
+    wrap: float = 0.0  # m, by which a refused surface may be wrapped instead; 0: that is no way
 
 
 class StudyError(UsageError):

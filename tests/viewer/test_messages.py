@@ -38,6 +38,7 @@ from palpate.viewer.part_messages import (
     PartNews,
     StartWish,
     UnitWish,
+    WrapWish,
 )
 from palpate.viewer.wire import Binary, Json, Layout
 
@@ -100,10 +101,11 @@ LEARNING = LearningProgress(
     "solving", 12, 0.02, None, 0.03, "kept", ((0.0, 1.0, 2.0),), 60.0, report=True, remaining=12.5, share=0.25
 )
 PART = (
-    PartNews(PROTOCOL, "kidney", "working", "words", 2, 1),
+    PartNews(PROTOCOL, "kidney", "refused", "words", 2, 1, "1 mm"),
     FACTS,
     WISH,
     UnitWish("m"),
+    WrapWish("1 mm"),
     Answer("no", {"depth": "too deep"}),
     LEARNING,
 )

@@ -78,7 +78,12 @@ def touch(
         _no_study_of_refusals(part, choices.name),
     ):
         if is_shown:
-            page = {"at_once": start, "port": port, "device": device, "on_address": lock.set_address}
+            page = {
+                "at_once": start or file.exists(),
+                "port": port,
+                "device": device,
+                "on_address": lock.set_address,
+            }
             _touch_on_page(part, choices, options, console, page)
         else:
             _touch_without_page(part, choices, options, console)
@@ -97,8 +102,11 @@ def _touch_on_page(
     )
     touch_on_page(
         part.stem,
-        lambda other: _study_on_page(
-            part, replace(choices, unit=other) if other else choices, notes, console
+        lambda unit, wrap: _study_on_page(
+            part,
+            replace(choices, unit=unit or choices.unit, wrap=choices.wrap if wrap is None else wrap),
+            notes,
+            console,
         ),
         lambda study: _write(part, study, notes),
         touched,

@@ -48,6 +48,7 @@ class _Work:
             env=helper_environment(),
             start_new_session=True,  # Ctrl-C in the terminal is for this process, which then ends the work
         )
+        self._heard = False
 
     def ask(self, line: str) -> None:
         """Send a line; nothing happens where the process has ended."""
@@ -58,6 +59,7 @@ class _Work:
 
     def __iter__(self) -> Any:
         assert self._process.stdout is not None
+        self._heard = True
         with self._process.stdout as lines:
             for line in lines:
                 with contextlib.suppress(ValueError):  # cut off by a kill
@@ -72,6 +74,8 @@ class _Work:
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(_GRACE)
         kill_group(process)  # type: ignore[arg-type]
+        if not self._heard and process.stdout is not None:  # a listener closes it
+            process.stdout.close()
         return int(process.returncode)
 
 
@@ -262,7 +266,7 @@ class TouchedPart:
 
 def touch_on_page(
     name: str,
-    study_of: Callable[[str | None], tuple[Study, Path, bool]],
+    study_of: Callable[[str | None, float | None], tuple[Study, Path, bool]],
     write: Callable[[Study], Path],
     touched: TouchedPart,
     *,
@@ -273,27 +277,32 @@ def touch_on_page(
 ) -> None:
     """Open the page of a part, let a person choose, and work until Ctrl-C.
 
-    `study_of` gets a unit of the file's numbers, or None at first; it returns the study of the part, its file, and
-    whether that was there before: then the work goes on at once, as with `at_once`, which begins with the first
-    choices. `write` writes a chosen study and returns its file. `on_ready` is called once with the running page; by
-    default its address is printed, and opened in the user's browser where there is a terminal. `on_address` gets that
-    address. The options are those of `PartPage`.
+    `study_of` gets a unit of the file's numbers and the size of a wrap in m, both None at first; it returns the study
+    of the part, its file, and whether that was there before: then the work goes on at once, as with `at_once`, which
+    begins with the first choices. A part that is refused and may be wrapped is so by a click, unless `at_once`.
+    `write` writes a chosen study and returns its file. `on_ready` is called once with the running page; by default its
+    address is printed, and opened in the user's browser where there is a terminal. `on_address` gets that address. The
+    options are those of `PartPage`.
     """
     from palpate.study.part_choices import chosen_study, shown_part
 
     known: list[Study] = []
     failures: list[BaseException] = []
+    wraps: list[float | None] = [None]
 
     def begin(choices: PartChoices) -> None:
         touched.begin(lambda: write(chosen_study(known[0], choices)))
 
-    def take_unit(unit: str) -> ShownPart:
-        known[:] = [study_of(unit)[0]]
-        return shown_part(known[0])
+    def renew(unit: str | None, size: float | None) -> ShownPart:
+        study = study_of(unit, size)[0]
+        part = shown_part(study)
+        known[:], wraps[:] = [study], [size]
+        failures.clear()
+        return part
 
     def read(page: PartPage) -> None:
         try:
-            study, file, there = study_of(None)
+            study, file, there = study_of(None, None)
             known.append(study)
             part = shown_part(study)
             page.show_part(part, begun=there or at_once)
@@ -303,9 +312,7 @@ def touch_on_page(
                 begin(part.choices)
         except PalpateError as error:
             failures.append(error)
-            page.end(str(error).replace("\n", " "))
-            if not page.visited.is_set():
-                threading.Thread(target=page.stop, daemon=True).start()
+            _show_refusal(page, error, touched.console, is_final=at_once)
 
     def ready(page: PartPage) -> None:
         touched.mark("page")
@@ -316,7 +323,8 @@ def touch_on_page(
             touched.console.say(f"{page.url} shows {page.caption} Ctrl-C ends it.")
         threading.Thread(target=read, args=(page,), daemon=True).start()
 
-    touched.page = PartPage(name, on_start=begin, on_unit=take_unit, **options)
+    options |= {"on_unit": lambda unit: renew(unit, wraps[0]), "on_wrap": lambda size: renew(None, size)}
+    touched.page = PartPage(name, on_start=begin, **options)
     try:
         wait_until_interrupted(
             touched.page, open_browser=on_ready is None and sys.stdout.isatty(), on_ready=ready
@@ -325,3 +333,15 @@ def touch_on_page(
         touched.close()
     if failures:
         raise failures[0]
+
+
+def _show_refusal(page: PartPage, error: PalpateError, console: Console, *, is_final: bool) -> None:
+    """Say on the page why a part is refused; a wrap is offered where that is a way, unless the refusal is final."""
+    words = str(error).replace("\n", " ")
+    if isinstance(error, UsageError) and error.wrap and not is_final:
+        console.say(f"{words} A click on the page wraps it.")
+        page.offer_wrap(words, error.wrap)
+        return
+    page.end(words)
+    if not page.visited.is_set():
+        threading.Thread(target=page.stop, daemon=True).start()

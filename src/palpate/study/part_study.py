@@ -256,8 +256,8 @@ def _read(path: Path, unit: str | None, wrap: float | None) -> tuple[str | None,
     except UsageError as error:
         try:
             return "m", part_shape(str(path), "m", wrap=wrap).faces
-        except PalpateError:
-            raise error from None
+        except PalpateError as other:  # a scan in metres may be in need of a wrap
+            raise (other if getattr(other, "wrap", 0.0) and not error.wrap else error) from None
     low = np.min([face.lower for face in faces], axis=0)
     length = float((np.max([face.upper for face in faces], axis=0) - low).max())
     if length >= SMALL:

@@ -67,7 +67,7 @@ __all__ = [
     "Vec3",
 ]
 
-PROTOCOL = 7  # a page of another protocol reloads itself
+PROTOCOL = 8  # a page of another protocol reloads itself
 
 Vec3 = tuple[float, float, float]
 

@@ -2,8 +2,9 @@
 
 The conversation, over a websocket of its own at ``/part``:
 
-1. The server says `PartNews` (JSON) at once and whenever the stage changes: reading the part, choosing, working,
-   ended. While it is chosen, the page asks for `PartFacts` (JSON) at ``/part/facts``, for the surface as `Surface` at
+1. The server says `PartNews` (JSON) at once and whenever the stage changes: reading the part, refused, choosing,
+   working, ended. A part is refused whose surface bounds no body; `WrapWish` (JSON) asks for it to be wrapped. While
+   it is chosen, the page asks for `PartFacts` (JSON) at ``/part/facts``, for the surface as `Surface` at
    ``/part/surface`` and for `PartFaces` at ``/part/faces``.
 2. A page may ask for another unit of the file's numbers with `UnitWish` (JSON). What was picked on the surface is sent
    as `Picks`, in pieces that are small enough for one message each; then `StartWish` (JSON) says all other
@@ -41,6 +42,7 @@ __all__ = [
     "StartWish",
     "TrustMap",
     "UnitWish",
+    "WrapWish",
 ]
 
 
@@ -132,11 +134,12 @@ class PartNews(Json):
 
     protocol: int  # `PROTOCOL`: a page of another one reloads itself
     name: str  # of the part
-    stage: str  # ``reading`` the part, ``choosing``, ``working`` or ``ended``
+    stage: str  # ``reading`` the part, ``refused``, ``choosing``, ``working`` or ``ended``
     words: str  # what goes on, in a sentence
     version: int  # of the body that can be touched; 0 where there is none yet
     # counts the parts that are shown: another unit makes another part of a file; 0 where there is none yet
     part: int
+    wrap: str = ""  # proposed size of a wrap of a part that is refused, as a text with its unit
 
 
 @dataclass(frozen=True)
@@ -176,8 +179,15 @@ class UnitWish(Json):
 
 
 @dataclass(frozen=True)
+class WrapWish(Json):
+    """The wish that a closed surface is wrapped around a refused one, page to server."""
+
+    size: str  # of the wrap, as a text with its unit
+
+
+@dataclass(frozen=True)
 class Answer(Json):
-    """The answer to `StartWish` and `UnitWish`, server to page: problems in sentences, or none where all fits."""
+    """The answer to a wish, server to page: problems in sentences, or none where all fits."""
 
     problem: str  # of the whole; empty where there is none
     # problems of single choices, by the names of `StartWish`; null: none of them was judged

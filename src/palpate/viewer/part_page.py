@@ -34,8 +34,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from palpate.devices import hand_kind
 from palpate.errors import PalpateError, UsageError
+from palpate.format import millimetres
 from palpate.runtime import LoopProcess
 from palpate.runtime.touchable import load_touchable
+from palpate.units import parse_quantity
 from palpate.viewer.compression import BinaryAnswers
 from palpate.viewer.messages import PROTOCOL
 from palpate.viewer.page_model import PageModel
@@ -48,6 +50,7 @@ from palpate.viewer.part_messages import (
     Role,
     StartWish,
     UnitWish,
+    WrapWish,
 )
 from palpate.viewer.server import body_routes
 from palpate.viewer.session import Session
@@ -146,6 +149,9 @@ class PartPage(LocalServer):
         `PalpateError`, which the page answers with; otherwise it returns at once, and the work goes on elsewhere.
     on_unit : callable, optional
         Gets another unit of the file's numbers, and returns the part as it is then; by default the unit stays.
+    on_wrap : callable, optional
+        Gets the size in m by which a refused part shall be wrapped, and returns the part as it is then. Needed where
+        `offer_wrap` is called.
     port, host, strict_port, token : int, str, bool, bool
         As for `Viewer`.
     device : str
@@ -169,12 +175,14 @@ class PartPage(LocalServer):
         *,
         on_start: Callable[[PartChoices], object],
         on_unit: Callable[[str], ShownPart] | None = None,
+        on_wrap: Callable[[float], ShownPart] | None = None,
         device: str = "page",
         recordings: str | os.PathLike[str] = ".",
         **server: Unpack[ServerOptions],
     ) -> None:
         super().__init__(**server)
         self.name, self._on_start, self._on_unit = name, on_start, on_unit
+        self._on_wrap, self._wrap = on_wrap, ""
         self._device, self._recordings = device, Path(recordings)
         self.stopped, self.visited = threading.Event(), threading.Event()
         self.loop: LoopProcess | None = None
@@ -194,6 +202,11 @@ class PartPage(LocalServer):
     def caption(self) -> str:
         """The part's name."""
         return f"{self.name}. Set it up there, and touch it;"
+
+    def offer_wrap(self, words: str, size: float) -> None:
+        """Say why a part is refused, and let a person have it wrapped by about `size`, in m."""
+        self._wrap = millimetres(size).replace("\N{NO-BREAK SPACE}", " ")
+        self._turn("refused", words)
 
     def show_part(self, part: ShownPart, *, begun: bool = False) -> None:
         """Show a part, on which a person now chooses what is held and touched.
@@ -353,6 +366,8 @@ class PartPage(LocalServer):
 
     def _answer(self, visitor: _Visitor, text: str) -> Answer:
         """Carry out a wish of a page that chooses; return what does not fit."""
+        if '"WrapWish"' in text:
+            return self._wrap_by(WrapWish.from_json(text))
         unit = '"UnitWish"' in text
         wish = UnitWish.from_json(text) if unit else StartWish.from_json(text)
         trial = isinstance(wish, StartWish) and wish.trial
@@ -371,6 +386,19 @@ class PartPage(LocalServer):
                 return Answer(" ".join(filter(None, (error.what, error.why, error.fix))), misfits)
             return Answer("", misfits, trial)
 
+    def _wrap_by(self, wish: WrapWish) -> Answer:
+        """Let a refused part be wrapped, and show it; return why it can't be."""
+        with self._starting:
+            if self._stage != "refused" or self._on_wrap is None:
+                return Answer("The part is wrapped already, by another page.")
+            try:
+                part = self._on_wrap(parse_quantity(wish.size, "m", "The size of the wrap", bare=False))
+            except PalpateError as error:
+                return Answer(" ".join(filter(None, (error.what, error.why, error.fix))))
+            self.show_part(part)
+            self._turn("choosing", " ".join(part.notes))  # which tell how far the surface moved
+            return Answer("")
+
     def _take_unit(self, part: ShownPart, unit: str) -> None:
         if self._on_unit is not None and unit in part.units:
             self.show_part(self._on_unit(unit))
@@ -384,7 +412,8 @@ class PartPage(LocalServer):
             self._turn("working", "")
 
     def _news(self) -> PartNews:
-        return PartNews(PROTOCOL, self.name, self._stage, self._words, self._version, self._parts_shown)
+        wrap = self._wrap if self._stage == "refused" else ""
+        return PartNews(PROTOCOL, self.name, self._stage, self._words, self._version, self._parts_shown, wrap)
 
     def _learning(self, progress: Progress) -> LearningProgress:
         places = np.asarray(progress.places, dtype=float).reshape(-1, 3)

@@ -75,3 +75,14 @@ def test_it_is_refused_with_an_offer_and_meshes_when_wrapped(tmp_path):
 def test_a_wrap_too_fine_for_memory_is_refused():
     with pytest.raises(UsageError, match="too fine"):
         wrap_surface(surface(*blobs()), 1e-5)
+
+
+def test_a_wrap_that_misses_a_part_is_refused():
+    """A small ball apart from a large one would be left out as a crumb."""
+    balls = [icosphere(3, radius=0.025), icosphere(2, radius=0.004)]
+    balls[1].apply_translation((0.05, 0, 0))
+    points = np.concatenate([ball.vertices for ball in balls])
+    triangles = np.concatenate([balls[0].faces, balls[1].faces + len(balls[0].vertices)])
+    with pytest.raises(UsageError, match="misses a part") as refusal:
+        wrap_surface(surface(points, triangles), 0.003)
+    assert "piece of its own" in refusal.value.why

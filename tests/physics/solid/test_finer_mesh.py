@@ -37,6 +37,17 @@ def test_elements_are_half_as_large_around_the_places_alone():
     assert same == pytest.approx(usual, rel=0.15)
 
 
+def test_the_rim_around_the_paint_becomes_finer_too():
+    """A ball that meets more than what is touched: elements follow the joint surface."""
+    probe = SphereProbe(radius=0.005, depth=(3e-4, 0.003), rim="side")
+    problem = pressed(probe=probe, element=0.006)
+    finer = finer_problem(problem, np.array([[0.020, 0.022, 0.034]]))
+    usual = {part.surface for part in problem.refinements}
+    (box,) = (part for part in finer.refinements if part not in problem.refinements)
+    assert box.surface in usual
+    assert box.element == pytest.approx(FINER * min(part.element for part in problem.refinements))
+
+
 def forces(problem, points):
     solver = problem.open()
     found = [solver.solve(point) for point in points]

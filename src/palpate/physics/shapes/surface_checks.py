@@ -45,11 +45,12 @@ def require_closed(surface: Trimesh, source: str) -> None:
     edges, count = surface.edges_unique, np.bincount(surface.edges_unique_inverse)
     open_edges, crowded = edges[count == 1], edges[count > 2]
     if len(open_edges):
-        raise UsageError(
+        raise _mended_by_wrap(
+            surface,
             f"The surface of {source} is open: {len(open_edges)} edges belong to one triangle only.",
             why=f"There {_where('hole', surface, open_edges)}, and a body needs a closed surface.",
             fix="Close the hole in the program that made the file, with its repair or fill-holes function, or have it "
-            f"wrapped: {_wrap_words(surface)}.",
+            "wrapped",
         )
     if len(crowded):
         raise UsageError(
@@ -60,10 +61,11 @@ def require_closed(surface: Trimesh, source: str) -> None:
         )
     if not surface.is_winding_consistent:
         twice = len(surface.edges) - len(np.unique(surface.edges, axis=0))
-        raise UsageError(
+        raise _mended_by_wrap(
+            surface,
             f"The triangles of {source} disagree on which side is outside, along {twice} edges.",
             why="Some of them are inverted: their corners run the other way than their neighbours'.",
-            fix=f"Recalculate the normals, and export again, or have it wrapped: {_wrap_words(surface)}.",
+            fix="Recalculate the normals, and export again, or have it wrapped",
         )
     if len(pinched := _pinch_points(surface)):
         raise UsageError(
@@ -72,12 +74,19 @@ def require_closed(surface: Trimesh, source: str) -> None:
             fix="Let the parts overlap and unite them (Boolean union), or move them apart, before the export.",
         )
     if (crossing := _crossing(surface)) is not None:
-        raise UsageError(
+        raise _mended_by_wrap(
+            surface,
             f"The surface of {source} cuts itself: triangles {crossing[0]} and {crossing[1]} cross.",
             why=f"They do so near {place(surface.triangles_center[crossing[0]])}; a body's surface has an inside and "
             "an outside everywhere.",
-            fix=f"Have it wrapped, which moves the surface a little: {_wrap_words(surface)}.",
+            fix="Have it wrapped, which moves the surface a little",
         )
+    _require_apart(surface, source)
+    _require_outside(surface, shells_of(surface), source)
+
+
+def _require_apart(surface: Trimesh, source: str) -> None:
+    """Refuse closed shells whose faces lie on each other."""
     if (contact := touching_shells(surface)) is not None:
         first, second, centre = contact
         raise UsageError(
@@ -85,16 +94,18 @@ def require_closed(surface: Trimesh, source: str) -> None:
             why="Faces of them lie on each other and share no nodes, so that the body is neither one nor two.",
             fix="Unite the parts (Boolean union) in the program that made the file, or move them apart.",
         )
-    _require_outside(surface, shells_of(surface), source)
 
 
-def _wrap_words(surface: Trimesh) -> str:
-    """Return how to have a surface wrapped, by about an eightieth of its length."""
-    size = float(f"{1e3 * float(surface.extents.max()) / WRAPPED:.1g}")
-    return (
+def _mended_by_wrap(surface: Trimesh, what: str, why: str, fix: str) -> UsageError:
+    """Return the refusal of a surface that may be wrapped, by about an eightieth of its length."""
+    size = float(f"{1e3 * float(surface.extents.max()) / WRAPPED:.1g}")  # mm
+    ways = (
         f"`palpate touch` with --wrap {size:g}mm, wrap = '{size:g} mm' in a study's [body], or "
         f"ImportedSolid(…, wrap={1e-3 * size:g})"
     )
+    error = UsageError(what, why=why, fix=f"{fix}: {ways}.")
+    error.wrap = 1e-3 * size
+    return error
 
 
 def _where(word: str, surface: Trimesh, edges: np.ndarray) -> str:

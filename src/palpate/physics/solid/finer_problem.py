@@ -31,7 +31,7 @@ def finer_problem(problem: Any, places: np.ndarray) -> Any:
     base = getattr(problem, "base", problem)
     probe = next(part for part in base.interactions if isinstance(part, SphereProbe))
     wide = base.refinements
-    size = FINER * min(part.element for part in wide if part.surface == probe.meets)
+    size = FINER * min(part.element for part in wide if part.surface in {probe.meets, probe.touches})
     half = REACH * probe.radius
     corners = [np.array([place - half, place + half]) for place in np.asarray(places, dtype=float)[:, :3]]
     near = min(size, NEAR * probe.radius)

@@ -6,7 +6,7 @@ import type { Layout } from "./wire";
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 7;
+export const PROTOCOL = 8;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -157,6 +157,7 @@ export interface PartNews {
   words: string;
   version: number;
   part: number;
+  wrap: string;
 }
 
 /** A part and the choices that were made for it, server to page. */
@@ -189,7 +190,12 @@ export interface UnitWish {
   unit: string;
 }
 
-/** The answer to `StartWish` and `UnitWish`, server to page: problems in sentences, or none where all fits. */
+/** The wish that a closed surface is wrapped around a refused one, page to server. */
+export interface WrapWish {
+  size: string;
+}
+
+/** The answer to a wish, server to page: problems in sentences, or none where all fits. */
 export interface Answer {
   problem: string;
   fields: Record<string, unknown> | null;
@@ -251,6 +257,10 @@ export function isStartWish(message: { kind: string }): message is StartWish & {
 
 export function isUnitWish(message: { kind: string }): message is UnitWish & { kind: string } {
   return message.kind === "UnitWish";
+}
+
+export function isWrapWish(message: { kind: string }): message is WrapWish & { kind: string } {
+  return message.kind === "WrapWish";
 }
 
 export function isAnswer(message: { kind: string }): message is Answer & { kind: string } {

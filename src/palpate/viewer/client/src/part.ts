@@ -17,6 +17,7 @@ import {
 } from "./messages";
 import type { LearningProgress, PartFacts, PartNews, StartWish } from "./messages";
 import { PartView } from "./part_view";
+import { Refusal } from "./refusal";
 import { lose } from "./restart";
 import { Setup } from "./setup";
 import { mode, watch } from "./skeleton";
@@ -35,6 +36,7 @@ const root = document.documentElement;
 let socket: WebSocket;
 let view: PartView | null = null;
 let setup: Setup | null = null;
+let refusal: Refusal | null = null;
 let loading: Promise<PartFacts> | null = null;
 let touched: Touched | null = null;
 let news: PartNews | null = null;
@@ -77,7 +79,7 @@ function send(message: string | ArrayBuffer): void {
 
 function hear(message: { kind: string }): void {
   if (isPartNews(message)) turn(message);
-  if (isAnswer(message)) setup?.answer(message);
+  if (isAnswer(message)) (setup ?? refusal)?.answer(message);
   if (!isLearningProgress(message)) return;
   progress = message;
   learning.hear(message);
@@ -96,6 +98,7 @@ function turn(message: PartNews): void {
   root.dataset["stage"] = message.stage;
   document.title = `${message.name} · palpate`;
   if (!touched) element("model-name").textContent = message.name;
+  if (message.stage === "refused") refuse(message);
   if (message.stage === "choosing") choose();
   if (message.stage === "working" || message.stage === "ended") work(message);
 }
@@ -105,9 +108,17 @@ function isOther(message: PartNews, before: PartNews): boolean {
   return other || (before.part > 0 && before.part !== message.part);
 }
 
+/** Say why the part is refused, and offer a wrap. */
+function refuse({ words, wrap }: PartNews): void {
+  status("live", "refused");
+  mode("refused");
+  refusal ??= new Refusal(words, wrap, (size) => send(JSON.stringify({ kind: "WrapWish", size })));
+}
+
 /** Show the part with all that can be chosen. */
 function choose(): void {
   status("connecting", "not started yet");
+  if (news?.words) say(news.words, "calm");
   loading ??= open();
   loading
     .then((facts) => {
@@ -150,6 +161,7 @@ function begin(wish: StartWish, held: number[] | null, chosen: number[] | null):
 /** Solves run, or have ended; the body is touched once there is one. */
 function work(message: PartNews): void {
   root.dataset["learning"] = "";
+  if (element("banner").dataset["tone"] === "calm") element("banner").hidden = true; // of a wrap
   if (message.stage === "ended") learning.end(message.words);
   else if (message.words) element("phase").textContent = message.words;
   wait();

@@ -4,6 +4,7 @@
 // press   one that is pressed by a probe
 // pad     one that is held by a pad
 // shown   a solved body that is looked at
+// refused a part whose surface bounds no body, and may be wrapped
 // setup   a part that is set up
 // work    a part that is solved and can't be touched yet
 // answers a surrogate that answers inputs and is not touched
@@ -13,13 +14,14 @@
 import { element } from "./units";
 import type { View } from "./view";
 
-export type Mode = "line" | "press" | "pad" | "shown" | "setup" | "work" | "answers";
+export type Mode = "line" | "press" | "pad" | "shown" | "refused" | "setup" | "work" | "answers";
 
 const LABELS: Record<Mode, string> = {
   line: "The body. Arrow keys pull the held end, Escape lets it go.",
   press: "The body. Hold the space bar to press, arrow keys move the probe, Page Up and Page Down change the depth.",
   pad: "The body. Arrow keys pull the pad, Escape lets it go.",
   shown: "The body. Arrow keys left and right change the state, the mouse turns it.",
+  refused: "No body yet: its surface is refused.",
   setup: "The body, which can be touched later.",
   work: "The body, which can be touched later.",
   answers: "The body, coloured by the chosen field. The mouse turns it, a click reads a value.",

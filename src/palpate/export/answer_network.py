@@ -112,7 +112,7 @@ class AnswerNetwork:
         xi = self.networks[0].scaling.scale_inputs(X)
         if not self.regions:
             return np.asarray((np.abs(xi) <= 1.0 + 1e-9).all(axis=1))
-        return np.all([region.distances(xi) <= region.radius for region in self.regions], axis=0)
+        return np.asarray(np.all([region.distances(xi) <= region.radius for region in self.regions], axis=0))
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class _Rows:
 
 def answers_of(thing: Surrogate | Network) -> AnswerNetwork | None:
     """Return what a network, or a surrogate that no hand feels, answers as a whole; None of a touched body."""
-    if not hasattr(thing, "can_be_touched"):
+    if isinstance(thing, Network):
         return AnswerNetwork("network", (thing,), (), (), (len(thing.outputs),))
     return None if thing.can_be_touched else whole_answers(thing)
 

@@ -224,7 +224,7 @@ class CheckFmu:
         for way in np.vstack([np.zeros(len(self._ways)), np.eye(len(self._ways))]):
             self._steps.restart(self._ways, list(way))
             places.append(self._steps.read(_PLACE))
-        return np.array(places[1:]) - np.array(places[0])
+        return np.asarray(np.array(places[1:]) - np.array(places[0]))
 
     def outputs(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, None]:
         """Return the answers (N, m) of what no hand feels at X (N, n), and which are in the trained region (N,)."""

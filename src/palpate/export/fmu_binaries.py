@@ -38,8 +38,15 @@ _SOURCES = (
     "fmi3.c",
 )
 # small code for macOS: both machines' parts stand in one file of FMI 2.0, which is to be less than 200 kB
-# little is inlined there; the head has room for a signature, and not a page of it
-_SMALL = ("-Os", "-mllvm", "-inline-threshold=5", "-Wl,-headerpad,0x100")
+# little is inlined there, and nothing unwinds; the head has room for a signature, and not a page of it
+_SMALL = (
+    "-Os",
+    "-mllvm",
+    "-inline-threshold=5",
+    "-fno-unwind-tables",
+    "-fno-asynchronous-unwind-tables",
+    "-Wl,-headerpad,0x100",
+)
 TARGETS: Mapping[str, tuple[str, ...]] = {
     "x86_64-linux/.so": ("-target", "x86_64-linux-gnu.2.17", "-O2"),
     "x86_64-windows/.dll": ("-target", "x86_64-windows-gnu", "-O2"),

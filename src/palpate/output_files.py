@@ -190,7 +190,8 @@ def is_own(path: Path) -> bool:
         return mark in content[:span]
     if ending in _LIBRARIES:  # which exports the functions of that name
         name = path.stem.removeprefix("lib").encode()
-        return all(name + function in content for function in (b"_hash", b"_limits", b"_deviation"))
+        ours = all(name + function in content for function in (b"_hash", b"_limits"))
+        return ours and any(name + function in content for function in (b"_deviation", b"_evaluate"))
     if ending in {".json", ".fmu"}:
         return _is_card(content) if ending == ".json" else _is_fmu(path)
     # nobody else has that ending, and a damaged file is no loss

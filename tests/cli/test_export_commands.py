@@ -93,6 +93,7 @@ def test_names_are_those_of_the_file_and_lie_beside_it(palpate, pad, tmp_path):
         "my-liver.palpate",
         "my-liver",
         "my-liver.fmu",
+        "run_fmu.py",
         "my-liver-page.html",
     }
 

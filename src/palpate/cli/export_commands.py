@@ -12,8 +12,10 @@ import typer
 
 from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
+from palpate.cli.number_options import number_option
 from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
+from palpate.number_text import whole_number
 
 if TYPE_CHECKING:
     from palpate.export import ExportedC, ExportedFmu
@@ -70,8 +72,8 @@ def _read(file: Path) -> Surrogate | Network:
     from palpate.surrogates import Surrogate
 
     thing = load(file)
-    if isinstance(thing, Surrogate) and not thing.can_be_touched:
-        return thing.plain_network
+    if isinstance(thing, Surrogate):
+        return thing
     thing = getattr(thing, "network", thing)
     if not isinstance(thing, Surrogate | Network):
         raise UsageError(
@@ -90,15 +92,24 @@ def _name_of(file: Path) -> str:
     return f"model{name}" if name.startswith("_") else name
 
 
-def _body(file: Path) -> Surrogate:
-    from palpate.surrogates import Surrogate
+def _surrogate(file: Path) -> Surrogate:
+    """Return the surrogate of a file; a network alone is one that answers its outputs."""
+    from palpate.surrogates import LearntQuantities, Surrogate
 
     thing = _read(file)
-    if not isinstance(thing, Surrogate):
+    if isinstance(thing, Surrogate):
+        return thing
+    return Surrogate(meta={"name": file.stem}, quantities={"outputs": LearntQuantities(thing)})
+
+
+def _body(file: Path) -> Surrogate:
+    """Return the surrogate of a file that a hand feels."""
+    thing = _surrogate(file)
+    if not thing.can_be_touched:
         raise UsageError(
-            f"{file} holds a network alone.",
+            f"{file} can't be touched.",
             why="This way out is for learnt bodies, which answer a hand.",
-            fix="Take the network out with `palpate export c` or `palpate export onnx`.",
+            fix="Take it out with `palpate export fmu`, `lib`, `c` or `onnx`.",
         )
     return thing
 
@@ -128,6 +139,20 @@ def _print(
     lines = [f"{file}  {file.stat().st_size / 1e3:.0f} kB{words}" for file in files]
     lines += [] if done.comparison is None else [str(done.comparison)]
     console.result("\n".join(lines), done.as_dict())
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(word.strip() for word in text.split(",") if word.strip())
+
+
+def _places(text: str) -> tuple[int, ...]:
+    """Return the numbers of places that an option lists."""
+    try:
+        return tuple(whole_number(word) for word in _names(text))
+    except UsageError as error:
+        raise UsageError(
+            f"--at-nodes: {error.what}", why=error.why, fix="List numbers of places: --at-nodes 12,40"
+        ) from error
 
 
 @export_app.command("c")
@@ -189,7 +214,7 @@ def to_library(
     """
     from palpate.export import export_lib
 
-    thing, console = _body(file), Console(as_json)
+    thing, console = _surrogate(file), Console(as_json)
     done = export_lib(
         thing,
         file.with_name(name or file.stem) if out is None else out,
@@ -215,23 +240,50 @@ def to_fmu(
     fmi: Annotated[
         str, typer.Option("--fmi", help="Version of FMI: 2.0, which most tools import, or 3.0.")
     ] = "2.0",
+    at_nodes: Annotated[
+        str, typer.Option(help="Places of fields whose values go out, by numbers from 0: 12,40.")
+    ] = "",
+    means: Annotated[str, typer.Option(help="Fields whose mean goes out: temperature.")] = "",
+    extremes: Annotated[
+        str, typer.Option(help="Fields whose largest and least value go out: temperature,stress.")
+    ] = "",
+    mass: Annotated[
+        float | None,
+        number_option(
+            "--mass", "kg", help="Mass at the tip of a body, which the FMU moves: 0.1kg.", above=0.0
+        ),
+    ] = None,
+    damping: Annotated[
+        float | None,
+        number_option("--damping", help="Damping of that mass, N·s/m. Default: 0.", least=0.0),
+    ] = None,
     no_deviation: NoDeviation = False,
     no_check: NoCheck = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write an FMU (FMI 2.0 or 3.0) for Simulink and others; nothing is compiled.
+    """Write an FMU (FMI 2.0 or 3.0) for Simulink and others, and run_fmu.py beside it; nothing is compiled.
 
+    A touched body answers a place by a force; with --mass it answers a force by the place of that mass. All else
+    answers its inputs by its numbers, its curves, and of each field mean, largest and least value or what is chosen.
     Where FMPy is installed the FMU is loaded, and compared with palpate at 1,000 places; one that differs is refused.
     """
-    from palpate.export import export_fmu
+    from palpate.export import CarriedMass, Choice, export_fmu
 
-    thing, console = _body(file), Console(as_json)
+    thing, console = _surrogate(file), Console(as_json)
+    if damping is not None and mass is None:
+        raise UsageError(
+            "There is a damping, but no mass.",
+            why="The FMU moves a mass at the tip of the body, and that is what the damping brakes.",
+            fix="Give both: --mass 0.1kg --damping 0.5",
+        )
     done = export_fmu(
         thing,
         file.with_name(f"{name or file.stem}.fmu") if out is None else out,
         name=name or _name_of(file),
         fmi=fmi,
+        choice=Choice(_places(at_nodes), _names(means), _names(extremes)),
+        carried=None if mass is None else CarriedMass(mass, damping or 0.0),
         deviation=not no_deviation,
         check=not no_check,
         overwrite=force,

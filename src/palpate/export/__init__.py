@@ -6,11 +6,14 @@ core_source     the core's sources as one text, with the baseline and the memory
 c_files         header, source, example and CMake file of a body or a network
 compilers       the C compilers of this machine, and how a program is compiled with them
 check_points    places at which every export is compared with palpate, and how
+answer_network  numbers, curves and fields that no hand feels, as networks whose outputs go out
+check_answers   how far these are from palpate
 check_program   a compiled export that answers them
 c_export        `palpate export c`: write, compile and compare
 lib_export      `palpate export lib`: a shared library, with wrappers for other programs
 check_library   a library that answers through its Python wrapper
 fmu_export      `palpate export fmu`: description, weights and the binaries of fmu_binaries, which read them
+carried_mass    a mass at the tip of a body, which an FMU moves
 check_fmu       an FMU that answers through FMPy
 core            the C sources; templates: texts of exported files
 umbridge_server a learnt file as a model of UM-Bridge, on this machine
@@ -19,12 +22,16 @@ answer_shapes   shapes of a surrogate without touch, coloured by a field
 shape_files     shapes of datasets and of learnt bodies, as VTU series and glTF
 """
 
+from palpate.export.answer_network import Choice
 from palpate.export.c_export import ExportedC, export_c
+from palpate.export.carried_mass import CarriedMass
 from palpate.export.fmu_export import ExportedFmu, export_fmu
 from palpate.export.lib_export import ExportedLibrary, export_lib
 from palpate.export.weights_block import WeightsBlock
 
 __all__ = [
+    "CarriedMass",
+    "Choice",
     "ExportedC",
     "ExportedFmu",
     "ExportedLibrary",

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from palpate.export.answer_network import AnswerNetwork, answers_of
 from palpate.export.c_files import c_files, require_name
-from palpate.export.check_points import Comparison, Precision, compare_body, compare_network
+from palpate.export.check_answers import compare_answers
+from palpate.export.check_points import Comparison, Precision, compare_body
 from palpate.export.check_program import CheckProgram
 from palpate.export.compilers import find_compiler
 from palpate.export.field_tables import chosen_field
@@ -82,7 +84,9 @@ def export_c(
     compiler: str | None = None,
     overwrite: bool = False,
 ) -> ExportedC:
-    """Write a body or a network as C99, and compare it with palpate at 1,000 places if there is a C compiler.
+    """Write a surrogate or a network as C99, and compare it with palpate at 1,000 places if there is a C compiler.
+
+    Of what no hand feels all numbers, and all values of all fields and curves go out.
 
     Parameters
     ----------
@@ -115,7 +119,7 @@ def export_c(
     """
     name = require_name(identifier(_default_name(thing)) if name is None else name)
     block = block_of(thing, field=field, with_field=with_field, deviation=deviation)
-    texts = c_files(thing, block, name, single=single)
+    texts = c_files(_sources(thing), block, name, single=single)
     card = card_of(thing).with_hash(block.label, block.hash)
     texts |= {f"{name}_card.md": card.to_markdown(), f"{name}_card.json": card.to_json()}
     folder = Path(out)
@@ -147,6 +151,8 @@ def block_of(
     """Return the weights of a body or of a network; an error where a part of it has no C source."""
     if isinstance(thing, Network):
         return WeightsBlock.of_network(thing)
+    if (answers := answers_of(thing)) is not None:
+        return WeightsBlock.of_answers(answers)
     chosen = chosen_field(thing, field) if with_field else None
     return WeightsBlock.of(thing, field=chosen, deviation=deviation)
 
@@ -163,11 +169,12 @@ def compare_c(
     """Compile exported files and compare them with palpate."""
     precision = Precision(single)
     with tempfile.TemporaryDirectory() as folder:
-        if isinstance(thing, Network):
+        if (answers := answers_of(thing)) is not None:
             program = CheckProgram.compile(
                 compiler, done.sources, done.name, Path(folder), network=True, options=options
             )
-            return compare_network(thing, lambda X: program.evaluate(X, len(thing.outputs)), precision)
+            return compare_answers(answers, lambda X: program.replies(X, len(answers.outputs)), precision)
+        assert isinstance(thing, Surrogate)
         nodes = thing.fields[block.field].rest.shape if block.field else (0, 0)  # type: ignore[union-attr]
         program = CheckProgram.compile(
             compiler,
@@ -180,6 +187,15 @@ def compare_c(
         )
         known = ROOT in block.tables
         return compare_body(thing, program, precision, field=block.field, deviation=known)
+
+
+def _sources(thing: Surrogate | Network) -> Surrogate | AnswerNetwork:
+    """Return what the C files are of: the answers, or a body that a hand feels."""
+    answers = answers_of(thing)
+    if answers is None:
+        assert isinstance(thing, Surrogate)
+        return thing
+    return answers
 
 
 def _default_name(thing: Surrogate | Network) -> str:

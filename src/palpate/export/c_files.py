@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.export.answer_network import AnswerNetwork
 from palpate.export.core_source import core_source, fill_template
-from palpate.export.weights_block import ARRAYS, FIELD, NET, POINTS, ROOT, Table, WeightsBlock
-from palpate.network import Network
+from palpate.export.weights_block import ANSWER_NETS, ARRAYS, FIELD, NET, POINTS, ROOT, Table, WeightsBlock
 from palpate.surrogates import Surrogate
 from palpate.units import Quantity, Range
 
@@ -60,15 +60,15 @@ class _Facts:
         return "float" if self.single else "double"
 
 
-def c_files(thing: Surrogate | Network, block: WeightsBlock, name: str, *, single: bool) -> dict[str, str]:
+def c_files(
+    thing: Surrogate | AnswerNetwork, block: WeightsBlock, name: str, *, single: bool
+) -> dict[str, str]:
     """Return the texts of all files by their names; `name` begins all names in C, `single` gives 32-bit numbers."""
-    outputs, felt, title, parts = (
-        thing.outputs if isinstance(thing, Network) else (),
-        0,
-        str(thing),
-        ["NETWORK"],
-    )
-    if isinstance(thing, Surrogate):
+    outputs: tuple[Quantity, ...] = ()
+    felt, title, parts = 0, str(thing), ["NETWORK"]
+    if isinstance(thing, AnswerNetwork):
+        outputs = thing.outputs
+    else:
         felt, title = len(thing.hand_energy.baseline.directions), title.splitlines()[0]
         has = {"BODY": True, "MEMORY": block.memory, "RELEASE": block.releases, "FIELD": block.field}
         parts = [part for part, there in has.items() if there]
@@ -86,7 +86,7 @@ def c_files(thing: Surrogate | Network, block: WeightsBlock, name: str, *, singl
     return files
 
 
-def _words(facts: _Facts, thing: Surrogate | Network) -> dict[str, str]:
+def _words(facts: _Facts, thing: Surrogate | AnswerNetwork) -> dict[str, str]:
     """Return what stands in the files for the words of the templates."""
     sizes, along = [len(facts.inputs)], ""
     if isinstance(thing, Surrogate):
@@ -101,7 +101,7 @@ def _words(facts: _Facts, thing: Surrogate | Network) -> dict[str, str]:
         "@ALONG@": along,
         "@OUTPUTS@": str(len(facts.outputs)),
         "@SIZES@": ", ".join(map(str, sizes)),
-        "@LATENT@": str(int(facts.block.tables[NET].values[4])),
+        "@LATENT@": str(_latent(facts.block)),
         "@LAW@": facts.block.memory,
         "@HASH@": facts.block.hash,
     } | {f"@{place}@": str(size) for place, size in zip(places, sizes, strict=False)}
@@ -149,9 +149,15 @@ def _costs(facts: _Facts) -> list[str]:
     ]
 
 
+def _latent(block: WeightsBlock) -> int:
+    """Return the latent outputs of the largest network."""
+    places = ANSWER_NETS if not block.baseline else (NET,)
+    return max(int(block.tables[place].values[4]) for place in places if place in block.tables)
+
+
 def _stack_bytes(facts: _Facts) -> int:
     """Return a bound of the stack, bytes: frames of the core, and the rows that a network alone keeps on it."""
-    size, latent = (4 if facts.single else 8), int(facts.block.tables[NET].values[4])
+    size, latent = (4 if facts.single else 8), _latent(facts.block)
     rows = latent * (1 + len(facts.inputs)) + len(facts.outputs) if facts.outputs else 0
     return _STACK[facts.single] + size * rows
 
@@ -175,9 +181,9 @@ def _thousands(count: int) -> str:
     return f"{count / 1e3:.2g}" if count < 1e5 else f"{count / 1e3:.0f}"
 
 
-def _notes(facts: _Facts, thing: Surrogate | Network) -> list[str]:
+def _notes(facts: _Facts, thing: Surrogate | AnswerNetwork) -> list[str]:
     """Return what the header tells of the arguments of its functions."""
-    if isinstance(thing, Network):
+    if isinstance(thing, AnswerNetwork):
         return ["", *(f"output {i}: {q.name} {q.unit}".rstrip() for i, q in enumerate(facts.outputs[:50]))]
     holds = thing.hand_energy.baseline.holds
     x = "displacement of what the hand holds from its rest" if holds else "centre of the probe"

@@ -11,6 +11,7 @@ import numpy as np
 
 from palpate.errors import ResourceError
 from palpate.export.check_points import ANSWERS, CONTACT, NOT_A_NUMBER, TOO_DEEP, TRUSTED
+from palpate.export.fmu_variables import ANSWER
 
 __all__ = ["CheckFmu", "FmuInstance", "open_instance"]
 
@@ -22,6 +23,9 @@ class FmuInstance(Protocol):
 
     def begin(self, *, again: bool = True) -> None:
         """Go through initialization; first back to the start, with all that was set, where `again` is true."""
+
+    def restart(self, references: list[int], values: list[float]) -> None:
+        """Go back to the start, set real variables or states, and go through initialization."""
 
     def write(self, references: list[int], values: list[float]) -> None:
         """Set real variables."""
@@ -97,6 +101,11 @@ class _Instance:
             self.fmu.enterInitializationMode(startTime=0.0)
         self.fmu.exitInitializationMode()
 
+    def restart(self, references: list[int], values: list[float]) -> None:
+        self.fmu.reset()
+        self.write(references, values)
+        self.begin(again=False)
+
     def write(self, references: list[int], values: list[float]) -> None:
         (self.fmu.setReal if self._former else self.fmu.setFloat64)(references, values)
 
@@ -150,6 +159,10 @@ class CheckFmu:
             for v in variables
             if v.valueReference in _PARAMETERS and v.causality == "parameter"
         ]
+        self._inputs = [v.valueReference for v in variables if v.causality == "input"]
+        self._answers = [v.valueReference for v in variables if v.valueReference >= ANSWER]
+        # ways of a mass along the felt directions, and these directions
+        self._ways = [v.valueReference for v in variables if v.name.startswith("way_")]
         self._remembers = any(v.name == "stored" for v in variables)
         self._steps = open_instance(self._description, self._folder)
         self._felt = self._remembers and self._description.modelExchange is not None
@@ -168,6 +181,8 @@ class CheckFmu:
 
     def answers(self, X: np.ndarray) -> np.ndarray:
         """Return `ANSWERS` numbers for each row of X (N, 3 + p); not-a-number what an FMU does not tell."""
+        if self._ways:
+            return self._carried(X)
         rows, asked = np.full((len(X), ANSWERS), np.nan), self._places
         self._steps.begin()
         if self._felt:
@@ -187,6 +202,39 @@ class CheckFmu:
             finite = np.isfinite(row[0])
             row[20] = TRUSTED * inside + CONTACT * contact + TOO_DEEP * deep if finite else NOT_A_NUMBER
         return rows
+
+    def _carried(self, X: np.ndarray) -> np.ndarray:
+        """Return `answers` of a body that carries a mass, which begins at each place."""
+        rows = np.full((len(X), ANSWERS), np.nan)
+        D = self._directions()
+        for row, x in zip(rows, X, strict=True):
+            ways = (
+                x[:3] if len(D) == 3 else np.where(np.isfinite(x[:3]).all(), D @ np.nan_to_num(x[:3]), np.nan)
+            )
+            self._steps.restart([*self._ways, *self._parameters], [*ways, *x[3:]])
+            row[:5], row[19] = self._steps.read(_OUTPUTS), self._steps.read([8])[0]
+            inside, contact, deep = self._steps.flags()
+            flags = TRUSTED * inside + CONTACT * contact + TOO_DEEP * deep
+            row[20] = flags if np.isfinite(row[0]) else NOT_A_NUMBER
+        return rows
+
+    def _directions(self) -> np.ndarray:
+        """Return the felt directions (k, 3): where a way of one metre leads from the place of none."""
+        places = []
+        for way in np.vstack([np.zeros(len(self._ways)), np.eye(len(self._ways))]):
+            self._steps.restart(self._ways, list(way))
+            places.append(self._steps.read(_PLACE))
+        return np.asarray(np.array(places[1:]) - np.array(places[0]))
+
+    def outputs(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, None]:
+        """Return the answers (N, m) of what no hand feels at X (N, n), and which are in the trained region (N,)."""
+        Y, inside = np.empty((len(X), len(self._answers))), np.zeros(len(X), dtype=bool)
+        self._steps.begin()
+        for i, x in enumerate(X.tolist()):
+            self._steps.write(self._inputs, x)
+            Y[i] = self._steps.read(self._answers)
+            inside[i] = self._steps.flags()[0]
+        return Y, inside, None
 
     def walk(self, X: np.ndarray) -> np.ndarray:
         """Return force, stored and lost energy (N, 5) of each step X (N, 1 + 3 + p)."""

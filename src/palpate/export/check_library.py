@@ -8,21 +8,42 @@ from typing import Any
 
 import numpy as np
 
+from palpate.export.check_answers import MOST_SLOPES, Replies
 from palpate.export.check_points import ANSWERS
 
-__all__ = ["CheckLibrary"]
+__all__ = ["CheckLibrary", "CheckModel"]
+
+
+def _module(wrapper: Path) -> Any:
+    spec = importlib.util.spec_from_file_location(f"exported_{wrapper.stem}", wrapper)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+class CheckModel:
+    """A library of what no hand feels, loaded by its Python wrapper's path."""
+
+    def __init__(self, wrapper: Path) -> None:
+        self._model: Any = _module(wrapper).Model()
+
+    def replies(self, X: np.ndarray) -> Replies:
+        """Return the answers (N, m), which are in the trained region (N,), and derivatives (N, m, n) at X (N, n)."""
+        rows = [self._model.evaluate(x) for x in X.tolist()]
+        inside = np.array([there for _, there in rows])
+        if self._model.outputs > MOST_SLOPES:
+            return np.array([y for y, _ in rows]), inside, None
+        slopes = [np.reshape(self._model.jacobian(x)[1], (-1, X.shape[1])) for x in X.tolist()]
+        return np.array([y for y, _ in rows]), inside, np.array(slopes)
 
 
 class CheckLibrary:
     """A library, loaded by its Python wrapper's path, that answers as `palpate.export.check_points.Asker` asks."""
 
     def __init__(self, wrapper: Path) -> None:
-        spec = importlib.util.spec_from_file_location(f"exported_{wrapper.stem}", wrapper)
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        self.body: Any = module.Body()
+        self.body: Any = _module(wrapper).Body()
 
     def answers(self, X: np.ndarray) -> np.ndarray:
         """Return `ANSWERS` numbers for each row of X (N, 3 + p)."""

@@ -34,11 +34,13 @@ __all__ = [
     "ExportedFile",
     "Precision",
     "Releaser",
+    "allowed",
     "compare_body",
     "compare_field",
     "compare_network",
     "compare_rest",
     "condition",
+    "difference",
     "places",
     "true_answers",
 ]
@@ -194,6 +196,12 @@ def condition(network: Network, X: np.ndarray) -> np.ndarray:
     return np.asarray(np.maximum(size / np.maximum(total, 1e-6 * size + 1e-300), 1.0).max(axis=1))
 
 
+def allowed(network: Network, X: np.ndarray, precision: Precision) -> np.ndarray:
+    """Return the relative difference (N,) that outputs of a network may have at X (N, n)."""
+    limit = np.minimum(_TIGHT * condition(network, X), _LOOSEST)
+    return np.full(len(X), precision.tolerance) if precision.single else limit
+
+
 def compare_body(
     surrogate: Surrogate,
     asker: Asker,
@@ -223,7 +231,7 @@ def compare_body(
         got[:, 1] = np.where(far & (got[:, 1] < 0), wanted[:, 1], got[:, 1])
     there = ~np.isnan(got).all(axis=0) | (not partial)
     parts = {
-        name: _difference(wanted[~deep][:, c], got[~deep][:, c], limit[~deep])
+        name: difference(wanted[~deep][:, c], got[~deep][:, c], limit[~deep])
         for name, c in _PARTS.items()
         if there[c].all()
     }
@@ -235,7 +243,7 @@ def compare_body(
         felt = ~deep & ((size == 0) | (size > (1e-3 if precision.single else 1e-7) * size.max()))
         felt &= ~(np.abs(wanted[:, 1]) < (1e-6 if precision.single else 1e-12))
         rough = np.full(felt.sum(), 1e-2 if precision.single else _DEVIATION)
-        parts["deviation"] = _difference(wanted[felt, 19:20], got[felt, 19:20], rough)
+        parts["deviation"] = difference(wanted[felt, 19:20], got[felt, 19:20], rough)
     parts["flags"] = _flags(energy, X, wanted, got, precision)
     if surrogate.memory is not None:
         parts |= _stroke(surrogate, asker, precision)
@@ -261,13 +269,12 @@ def compare_network(
         low - 0.3 * (high - low), high + 0.3 * (high - low), (1000, len(low))
     )
     Y, J = ask(X)
-    limit = np.minimum(_TIGHT * condition(network, X), _LOOSEST)
-    limit = np.full(len(X), precision.tolerance) if precision.single else limit
-    parts = {"outputs": _difference(network.predict(X), Y, limit)}
+    limit = allowed(network, X, precision)
+    parts = {"outputs": difference(network.predict(X), Y, limit)}
     if J is not None:
         slopes = np.stack([network.jacobian(x) for x in X]) * (high - low)
         rates = (J * (high - low)).reshape(len(X), -1)
-        parts["derivatives"] = _difference(slopes.reshape(len(X), -1), rates, limit)
+        parts["derivatives"] = difference(slopes.reshape(len(X), -1), rates, limit)
     return Comparison(parts, precision.single)
 
 
@@ -314,7 +321,7 @@ def _slope(
         of_depth = np.abs(2.0 * _radii(energy, X) - s) / np.maximum(np.abs(s), _ROUND_OFF)
         limit = np.maximum(limit, np.minimum(_TIGHT * np.nan_to_num(of_depth, nan=1.0), _LOOSEST))
     columns = [16, 17, 18]
-    return _difference(wanted[chosen][:, columns], got[chosen][:, columns], limit[chosen])
+    return difference(wanted[chosen][:, columns], got[chosen][:, columns], limit[chosen])
 
 
 def _radii(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
@@ -322,7 +329,7 @@ def _radii(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
     return np.full(len(X), energy.baseline.radius) if own is None else X[:, own]
 
 
-def _difference(wanted: np.ndarray, got: np.ndarray, limit: np.ndarray) -> Difference:
+def difference(wanted: np.ndarray, got: np.ndarray, limit: np.ndarray) -> Difference:
     """Compare columns (N, c) by the rule; what is not-a-number must be so in both."""
     known = np.isfinite(wanted)
     size = np.abs(np.where(known, wanted, 0.0)).max(initial=0.0)
@@ -381,8 +388,8 @@ def _stroke(surrogate: Surrogate, asker: Asker, precision: Precision) -> dict[st
     # what a step answers depends on all before it
     limit = np.full(_STROKE, precision.tolerance * 10 if precision.single else _LOOSEST / 10.0)
     return {
-        "memory": _difference(wanted[:, :3], got[:, :3], limit),
-        "stored": _difference(wanted[:, 3:], got[:, 3:], limit),
+        "memory": difference(wanted[:, :3], got[:, :3], limit),
+        "stored": difference(wanted[:, 3:], got[:, 3:], limit),
     }
 
 
@@ -407,7 +414,7 @@ def compare_rest(surrogate: Surrogate, export: Releaser) -> Difference:
         wanted[i] = moved.lies
         export.walk(np.ascontiguousarray(np.hstack([steps[:, None], X])))
         got[i] = export.release(X[-1], float(pause))
-    return _difference(wanted, got, np.full(_HISTORIES, _LOOSEST / 10.0))
+    return difference(wanted, got, np.full(_HISTORIES, _LOOSEST / 10.0))
 
 
 def compare_field(
@@ -421,4 +428,4 @@ def compare_field(
     X = X[(true_answers(surrogate.hand_energy, X)[:, 20].astype(int) & TOO_DEEP) == 0]
     wanted, got = shown.values(X), asker.shapes(X)
     limit = np.full(len(X), PROMISE if precision is None or not precision.single else 1e-3)
-    return _difference(wanted.reshape(len(X), -1), got.reshape(len(X), -1), limit)
+    return difference(wanted.reshape(len(X), -1), got.reshape(len(X), -1), limit)

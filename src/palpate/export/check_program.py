@@ -80,8 +80,9 @@ class CheckProgram:
         nodes, components = self.components
         return self._ask(2, X, nodes * components).reshape(len(X), nodes, components)
 
-    def evaluate(self, X: np.ndarray, outputs: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return outputs (N, m) and derivatives (N, m, n) of a network at X (N, n)."""
+    def replies(self, X: np.ndarray, outputs: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return outputs (N, m), whether they are in the trained region (N,), and derivatives (N, m, n) at X (N, n)."""
         n = X.shape[1]
-        rows = self._ask(3, X, outputs * (n + 1))
-        return rows[:, outputs * n :], rows[:, : outputs * n].reshape(len(X), outputs, n)
+        rows = self._ask(3, X, outputs * (n + 1) + 1)
+        slopes = rows[:, : outputs * n].reshape(len(X), outputs, n)
+        return rows[:, outputs * n : -1], rows[:, -1] != 0, slopes

@@ -30,6 +30,8 @@ def core_source(block: WeightsBlock) -> str:
             _hooks(block.baseline),
             core_file("energy.c"),
         ]
+    else:
+        parts.append(core_file("answers.c"))
     if block.memory:
         parts.append(block.sources[block.memory])
     if block.field:

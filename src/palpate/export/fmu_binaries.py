@@ -26,7 +26,10 @@ __all__ = ["build_binaries", "built_binaries", "fmu_source", "main"]
 
 _SOURCES = (
     "memory_states.c",
+    "answers.c",
+    "answers_block.c",
     "fmi_instance.c",
+    "fmi_motion.c",
     "fmi_body.c",
     "fmi_derivatives.c",
     "fmi_types.c",
@@ -35,7 +38,15 @@ _SOURCES = (
     "fmi3.c",
 )
 # small code for macOS: both machines' parts stand in one file of FMI 2.0, which is to be less than 200 kB
-_SMALL = ("-Os", "-Wl,-headerpad,0x100")  # room in the head for a signature, and not a page of it
+# little is inlined there, and nothing unwinds; the head has room for a signature, and not a page of it
+_SMALL = (
+    "-Os",
+    "-mllvm",
+    "-inline-threshold=5",
+    "-fno-unwind-tables",
+    "-fno-asynchronous-unwind-tables",
+    "-Wl,-headerpad,0x100",
+)
 TARGETS: Mapping[str, tuple[str, ...]] = {
     "x86_64-linux/.so": ("-target", "x86_64-linux-gnu.2.17", "-O2"),
     "x86_64-windows/.dll": ("-target", "x86_64-windows-gnu", "-O2"),

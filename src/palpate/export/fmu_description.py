@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
-from palpate.export.fmu_variables import FLAGS, Variable, body_variables, defined_units, has_exchange
-from palpate.surrogates import Surrogate
+from palpate.export.fmu_variables import FLAGS, Variable, defined_units
 
-__all__ = ["SOURCE", "build_description", "model_description"]
+__all__ = ["SOURCE", "Described", "build_description", "model_description"]
 
 SOURCE = "palpate_fmu.c"
 _TIME = 15  # value reference of time, which is a variable in 3.0
@@ -19,23 +19,36 @@ _CATEGORIES = (
 _EXPERIMENT = '<DefaultExperiment startTime="0" stopTime="1" stepSize="0.001"/>'
 
 
-def model_description(surrogate: Surrogate, name: str, guid: str, version: str) -> str:
+@dataclass(frozen=True)
+class Described:
+    """The facts of an FMU that its description tells.
+
+    `exchange` says whether it is for model exchange too, `derivatives` whether it provides directional ones.
+    """
+
+    name: str  # model identifier
+    words: str  # what it is, in a line
+    variables: Sequence[Variable]
+    exchange: bool = True
+    derivatives: bool = True
+
+
+def model_description(fmu: Described, guid: str, version: str) -> str:
     """Return the text of modelDescription.xml in version "2.0" or "3.0" of FMI.
 
-    `name` is the model identifier; `guid`, the SHA-256 of the weights, is guid or instantiation token.
+    `guid`, the SHA-256 of the weights, is guid or instantiation token.
     """
     from palpate.version import __version__
 
-    variables = body_variables(surrogate)
-    words, exchange = quoteattr(str(surrogate).splitlines()[0]), has_exchange(surrogate)
     identity, parts = ("guid", _parts2) if version == "2.0" else ("instantiationToken", _parts3)
-    kinds, listed, structure = parts(variables, name, exchange)
+    kinds, listed, structure = parts(fmu)
     # there are no event indicators: in 2.0 that is said where a solver could ask for them
-    indicators = ' numberOfEventIndicators="0"' if exchange and version == "2.0" else ""
+    indicators = ' numberOfEventIndicators="0"' if fmu.exchange and version == "2.0" else ""
     return (
-        f'{_HEAD}<fmiModelDescription fmiVersion="{version}" modelName="{name}" {identity}="{guid}" '
-        f'description={words} generationTool="palpate {__version__}" variableNamingConvention="flat"{indicators}>\n'
-        f"{kinds}\n<UnitDefinitions>{_units(variables, time=version == '3.0')}</UnitDefinitions>\n"
+        f'{_HEAD}<fmiModelDescription fmiVersion="{version}" modelName="{fmu.name}" {identity}="{guid}" '
+        f'description={quoteattr(fmu.words)} generationTool="palpate {__version__}" '
+        f'variableNamingConvention="flat"{indicators}>\n'
+        f"{kinds}\n<UnitDefinitions>{_units(fmu.variables, time=version == '3.0')}</UnitDefinitions>\n"
         f"{_CATEGORIES}\n{_EXPERIMENT}\n<ModelVariables>\n{listed}\n</ModelVariables>\n"
         f"<ModelStructure>{structure}</ModelStructure>\n</fmiModelDescription>\n"
     )
@@ -89,11 +102,13 @@ def _dependencies(references: Sequence[int] | None) -> str:
     return "" if references is None else f' dependencies="{" ".join(map(str, references))}"'
 
 
-def _parts2(variables: Sequence[Variable], name: str, exchange: bool) -> tuple[str, str, str]:
+def _parts2(fmu: Described) -> tuple[str, str, str]:
     """Return kinds of simulation, variables and structure of FMI 2.0, where variables are numbered from 1."""
+    variables, name, exchange = fmu.variables, fmu.name, fmu.exchange
     place = {v.reference: i for i, v in enumerate(variables, 1)}
     files = f'<SourceFiles><File name="{SOURCE}"/></SourceFiles>'
-    able = 'canGetAndSetFMUstate="true" canSerializeFMUstate="true" providesDirectionalDerivative="true"'
+    able = 'canGetAndSetFMUstate="true" canSerializeFMUstate="true"'
+    able += ' providesDirectionalDerivative="true"' if fmu.derivatives else ""
     kinds = f'<ModelExchange modelIdentifier="{name}" {able}>{files}</ModelExchange>\n' if exchange else ""
     kinds += (
         f'<CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true" {able}>{files}'
@@ -121,9 +136,11 @@ def _parts2(variables: Sequence[Variable], name: str, exchange: bool) -> tuple[s
     return f"{kinds}</CoSimulation>", "\n".join(map(scalar, variables)), structure
 
 
-def _parts3(variables: Sequence[Variable], name: str, exchange: bool) -> tuple[str, str, str]:
+def _parts3(fmu: Described) -> tuple[str, str, str]:
     """Return kinds of simulation, variables and structure of FMI 3.0, where variables go by their references."""
-    able = 'canGetAndSetFMUState="true" canSerializeFMUState="true" providesDirectionalDerivatives="true"'
+    variables, name, exchange = fmu.variables, fmu.name, fmu.exchange
+    able = 'canGetAndSetFMUState="true" canSerializeFMUState="true"'
+    able += ' providesDirectionalDerivatives="true"' if fmu.derivatives else ""
     steps = 'needsCompletedIntegratorStep="true"'  # it says where a flag has changed, which takes an event
     kinds = f'<ModelExchange modelIdentifier="{name}" {steps} {able}/>\n' if exchange else ""
     kinds += f'<CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true" {able}/>'

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -13,10 +13,23 @@ from palpate.export.weights_block import identifier
 from palpate.surrogates import Surrogate
 from palpate.units import bounds
 
-__all__ = ["Variable", "body_variables", "defined_units", "has_exchange"]
+if TYPE_CHECKING:
+    from palpate.export.answer_network import AnswerNetwork
+    from palpate.export.carried_mass import CarriedMass
+
+__all__ = [
+    "ANSWER",
+    "Variable",
+    "answer_variables",
+    "body_variables",
+    "defined_units",
+    "has_exchange",
+    "moving_variables",
+]
 
 PARAMETER, STATE, FLAGS, SCALE = 16, 64, 12, 9  # value references, as in core/fmi_instance.c
 DAMPING, MASS, LIGHT = 48, 49, 0.05  # the last is the start of MASS, kg: a light tool
+PUSH, SPEED, KINETIC, ANSWER = 50, 53, 56, 1024
 _MOST_STATES = 2000  # solvers keep a square matrix of them, and each is described by two variables
 _PLACES = (0, 1, 2)
 _UNITS: Mapping[str, str] = {
@@ -27,6 +40,9 @@ _UNITS: Mapping[str, str] = {
     "Pa": 'kg="1" m="-1" s="-2"',
     "N/m": 'kg="1" s="-2"',
     "N.s/m": 'kg="1" s="-1"',
+    "m/s": 'm="1" s="-1"',
+    "m/s2": 'm="1" s="-2"',
+    "K": 'K="1"',
     "kg": 'kg="1"',
     "s": 's="1"',
     "1": "",
@@ -81,6 +97,93 @@ def body_variables(surrogate: Surrogate) -> list[Variable]:
         *_outputs(surrogate),
         *(_states(surrogate) if surrogate.memory is not None and has_exchange(surrogate) else []),
     ]
+
+
+def answer_variables(answers: AnswerNetwork) -> list[Variable]:
+    """Return the variables of what no hand feels: inputs, answers, and whether they are in the trained region."""
+    every = tuple(range(PARAMETER, PARAMETER + len(answers.inputs)))
+    names = _different([r.name for r in answers.inputs] + [q.name for q in answers.outputs])
+    rows = [
+        Variable(
+            name,
+            f"{r.name}, trained from {r.low:g} to {r.high:g}",
+            reference,
+            "input",
+            "continuous",
+            r.unit or "1",
+            start=(r.low + r.high) / 2,
+        )
+        for name, reference, r in zip(names, every, answers.inputs, strict=False)
+    ]
+    # extremes stand behind all outputs of the networks, of which some are not replies
+    last = len(answers.networks[0].outputs)
+    places = [*range(answers.count), *range(last, last + len(answers.runs))]
+    rows += [
+        _output(name, q.name, ANSWER + i, q.unit or "1", every)
+        for name, i, q in zip(names[len(every) :], places, answers.outputs, strict=True)
+    ]
+    return [
+        *rows,
+        Variable("inside", "inside of the trained region", FLAGS, "output", "discrete", depends=every),
+    ]
+
+
+def _different(names: list[str]) -> list[str]:
+    """Return names as identifiers, with a number behind each that is there already."""
+    different: list[str] = []
+    for name in map(identifier, names):
+        count, new = 1, "inside_value" if name == "inside" else name
+        while new in different:
+            count += 1
+            new = f"{name}_{count}"
+        different.append(new)
+    return different
+
+
+def moving_variables(surrogate: Surrogate, carried: CarriedMass) -> list[Variable]:
+    """Return the variables of a body that carries a mass: pushes in, places and speeds out, states and their rates."""
+    ranges, k = surrogate.inputs, len(surrogate.hand_energy.baseline.directions)
+    states = range(STATE, STATE + k)
+    speeds = range(STATE + k, STATE + 2 * k)
+    pushes = tuple(range(PUSH, PUSH + 3))
+    parameters = [v for v in _parameters(surrogate) if v.name not in ("mass", "damping")]
+    rows = [
+        Variable(
+            f"push_{axis}", f"force on the mass, {axis}", PUSH + i, "input", "continuous", "N", start=0.0
+        )
+        for i, axis in enumerate("xyz")
+    ]
+    rows += [
+        _parameter("mass", "mass at the tip", MASS, "kg", carried.mass, 0.0),
+        _parameter("damping", "damping of the mass, by its speed", DAMPING, "N.s/m", carried.damping, 0.0),
+        *parameters,
+    ]
+    rows += [
+        _output(axis, f"place of the mass, {axis}", i, "m", tuple(states)) for i, axis in enumerate("xyz")
+    ]
+    rows += [
+        _output(f"v{axis}", f"speed of the mass, {axis}", SPEED + i, "m/s", tuple(speeds))
+        for i, axis in enumerate("xyz")
+    ]
+    rows += [replace(v, depends=tuple(states)) for v in _outputs(surrogate)]
+    rows.append(_output("kinetic", "kinetic energy of the mass", KINETIC, "J", tuple(speeds)))
+    start = [0.0] * k if surrogate.hand_energy.baseline.holds else [*_middles(surrogate)[:2], ranges[2].high]
+    for a, (state, speed) in enumerate(zip(states, speeds, strict=True), 1):
+        rows.append(
+            replace(
+                _state(
+                    f"way_{a}", f"way along direction {a}", state, "m", ranges[a - 1].high - ranges[a - 1].low
+                ),
+                start=float(start[a - 1]),
+            )
+        )
+        rows.append(
+            replace(_state(f"speed_{a}", f"speed along direction {a}", speed, "m/s", 1.0), nominal=None)
+        )
+    for a, (state, speed) in enumerate(zip(states, speeds, strict=True), 1):
+        rows.append(_rate(f"way_{a}", state + 2 * k, state, "m/s", (speed,)))
+        rows.append(_rate(f"speed_{a}", speed + 2 * k, speed, "m/s2", (*pushes, *states, *speeds)))
+    return rows
 
 
 def _inputs(surrogate: Surrogate) -> list[Variable]:

@@ -14,8 +14,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from palpate.export.answer_network import AnswerNetwork, answers_of
 from palpate.export.c_export import ExportedC, block_of, export_c
-from palpate.export.check_library import CheckLibrary
+from palpate.export.check_answers import compare_answers
+from palpate.export.check_library import CheckLibrary, CheckModel
 from palpate.export.check_points import Comparison, compare_body
 from palpate.export.compilers import compile_c, find_compiler
 from palpate.export.core_source import fill_template
@@ -72,12 +74,12 @@ def export_lib(
     compiler: str | None = None,
     overwrite: bool = False,
 ) -> ExportedLibrary:
-    """Write a body as a shared library with its sources and wrappers.
+    """Write a body, or numbers, curves and fields, as a shared library with its sources and wrappers.
 
     Parameters
     ----------
     surrogate : Surrogate
-        The body.
+        What goes out.
     out : path
         Folder for the files; it is made where it is missing, in a folder that exists.
     name, field, with_field, deviation : optional
@@ -128,15 +130,21 @@ def _build(
     whole = ExportedLibrary(done, wrappers, library, None)
     if not check:
         return whole
-    block = block_of(surrogate, **parts)
-    asked = CheckLibrary(folder / f"{done.name}.py")
-    comparison = compare_body(surrogate, asked, field=block.field, deviation=ROOT in block.tables)
+    comparison = _compared(surrogate, folder / f"{done.name}.py", parts)
     why, fix = (
         "The compiler may bend the arithmetic.",
         "Nothing was written. Try another compiler, and report this.",
     )
     comparison.require("The library does", why=why, fix=fix)
     return replace(whole, comparison=comparison)
+
+
+def _compared(surrogate: Surrogate, wrapper: Path, parts: dict[str, Any]) -> Comparison:
+    """Return how far the library beside a Python wrapper is from palpate."""
+    if (answers := answers_of(surrogate)) is not None:
+        return compare_answers(answers, CheckModel(wrapper).replies)
+    block = block_of(surrogate, **parts)
+    return compare_body(surrogate, CheckLibrary(wrapper), field=block.field, deviation=ROOT in block.tables)
 
 
 def _install_name(file: str) -> tuple[str, ...]:
@@ -160,6 +168,8 @@ def _copy(built: ExportedLibrary, folder: Path, *, overwrite: bool) -> ExportedL
 
 def _wrappers(surrogate: Surrogate, done: ExportedC) -> dict[str, str]:
     """Return the texts of the wrappers by their file names."""
+    if (answers := answers_of(surrogate)) is not None:
+        return _answer_wrappers(answers, done)
     name, baseline = done.name, surrogate.hand_energy.baseline
     middle = [(r.low + r.high) / 2 for r in surrogate.inputs]
     k = len(baseline.directions)
@@ -184,3 +194,20 @@ def _wrappers(surrogate: Surrogate, done: ExportedC) -> dict[str, str]:
         f"{name}_example.m": "example.m",
     }
     return {file: fill_template(template, words, parts) for file, template in templates.items()}
+
+
+def _answer_wrappers(answers: AnswerNetwork, done: ExportedC) -> dict[str, str]:
+    """Return the texts of the wrappers of what no hand feels: for Python and MATLAB."""
+    words = {
+        "@HASH@": done.hash,
+        "@MIDDLES@": "[" + ", ".join(f"{(r.low + r.high) / 2:.6g}" for r in answers.inputs) + "]",
+        "@INPUTS@": str(len(answers.inputs)),
+        "@OUTPUTS@": str(len(answers.outputs)),
+        "NAME": done.name,
+    }
+    templates = {
+        f"{done.name}.py": "wrapper_answers.py",
+        f"{done.name}_matlab.h": "wrapper_answers_matlab.h",
+        f"{done.name}_example.m": "example_answers.m",
+    }
+    return {file: fill_template(template, words, ()) for file, template in templates.items()}

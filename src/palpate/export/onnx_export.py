@@ -15,13 +15,15 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.export.answer_network import answers_of
+from palpate.export.c_export import block_of
+from palpate.export.check_answers import MOST_SLOPES, Replies, compare_answers
 from palpate.export.check_points import (
     ANSWERS,
     Comparison,
     ExportedFile,
     Precision,
     compare_body,
-    compare_network,
 )
 from palpate.export.onnx_body import add_body
 from palpate.export.onnx_graph import Graph, require_onnx
@@ -50,7 +52,7 @@ def export_onnx(
     tolerance: float = 1e-2,
     overwrite: bool = False,
 ) -> ExportedFile:
-    """Write a body or a network as NAME.onnx, and compare it with palpate in ONNX Runtime if that is installed.
+    """Write a surrogate or a network as NAME.onnx, and compare it with palpate in ONNX Runtime if that is installed.
 
     `single` gives numbers of 32 bits, the only ones that the browser's runtimes take; `elastic` leaves a memory out.
     `tolerance` is the largest difference in single precision, relative to the largest value; beyond it nothing is
@@ -67,11 +69,13 @@ def export_onnx(
             )
         thing = replace(thing, memory=None)
     graph = Graph(np.float32 if single else np.float64)
-    block: WeightsBlock
-    if isinstance(thing, Network):
-        block, name = WeightsBlock.of_network(thing), "network"
-        add_network(graph, thing)
+    answers = answers_of(thing)
+    if answers is not None:
+        name = answers.name
+        block = block_of(thing, field=None, with_field=False, deviation=False)
+        add_network(graph, *answers.networks)
     else:
+        assert isinstance(thing, Surrogate)
         block, name = WeightsBlock.of(replace(thing, fields={})), thing.name
         add_body(graph, thing.hand_energy)
     model = graph.model(name, _metadata(thing, block))
@@ -92,8 +96,9 @@ def _metadata(thing: Surrogate | Network, block: WeightsBlock) -> dict[str, str]
         "producer": "palpate",
         "card": card.to_json(),
     }
-    if isinstance(thing, Network):
-        return plain | {"outputs": json.dumps([asdict(q) for q in thing.outputs])}
+    if (answers := answers_of(thing)) is not None:
+        return plain | {"outputs": json.dumps([asdict(q) for q in answers.outputs]), "name": answers.name}
+    assert isinstance(thing, Surrogate)
     units = {
         "energy": "J",
         "force": "N",
@@ -114,14 +119,16 @@ def _compared(thing: Surrogate | Network, model: Any, precision: Precision) -> C
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     session = onnxruntime.InferenceSession(model.SerializeToString(), options)
-    if isinstance(thing, Network):
+    if (answers := answers_of(thing)) is not None:
         kind = np.float32 if precision.single else np.float64
+        wanted = ["y", "jacobian"] if len(answers.outputs) <= MOST_SLOPES else ["y"]
 
-        def ask(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            y, slopes = session.run(["y", "jacobian"], {"x": X.astype(kind)})
-            return np.asarray(y, dtype=np.float64), np.asarray(slopes, dtype=np.float64)
+        def ask(X: np.ndarray) -> Replies:
+            replies = [np.asarray(a, np.float64) for a in session.run(wanted, {"x": X.astype(kind)})]
+            return replies[0], None, replies[1] if len(replies) > 1 else None
 
-        return compare_network(thing, ask, precision)
+        return compare_answers(answers, ask, precision)
+    assert isinstance(thing, Surrogate)
     bare = replace(thing, fields={})
     return compare_body(
         bare, OnnxAsker(session, bare), precision, deviation=thing.hand_energy.root is not None

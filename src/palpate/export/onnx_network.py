@@ -109,13 +109,21 @@ def regressors(graph: Graph, network: Network, xi: Value, felt: int) -> tuple[Va
     return graph.join(one, xi, units.phi), (graph.join(*lines) if felt > 1 else lines[0])
 
 
-def add_network(graph: Graph, network: Network) -> None:
-    """Add the input ``x`` (N, n), and the outputs ``y`` (N, m) and ``jacobian`` (N, m, n) of a network, to a graph."""
-    n, m = len(network.inputs), len(network.outputs)
-    scaling = network.scaling
+def add_network(graph: Graph, *networks: Network) -> None:
+    """Add the input ``x`` (N, n), and the outputs ``y`` (N, m) and ``jacobian`` (N, m, n), to a graph.
+
+    Of several networks of the same inputs and outputs these are sums.
+    """
+    n, m = len(networks[0].inputs), len(networks[0].outputs)
     X = graph.input("x", n)
     graph.stage = "network"
-    row, lines = regressors(graph, network, (X - scaling.input_centre) / scaling.input_half, n)
-    rows = _rows(network)
-    graph.output("y", row @ rows, (m,))
-    graph.output("jacobian", (lines @ rows).swap(), (m, n))
+    values: Any = None
+    slopes: Any = None
+    for network in networks:
+        scaling, rows = network.scaling, _rows(network)
+        row, lines = regressors(graph, network, (X - scaling.input_centre) / scaling.input_half, n)
+        value, slope = row @ rows, (lines @ rows).swap()
+        values = value if values is None else values + value
+        slopes = slope if slopes is None else slopes + slope
+    graph.output("y", values, (m,))
+    graph.output("jacobian", slopes, (m, n))

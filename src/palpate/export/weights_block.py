@@ -19,23 +19,28 @@ import hashlib
 import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.network import Network
+from palpate.network import Network, TrainedRegion
 from palpate.network.network_kernels import gram, packed
 from palpate.network.radial import RADIAL_FUNCTIONS
 from palpate.surrogates import LearntEnergy, Surrogate, TouchedSurface
 from palpate.units import bounds
 
+if TYPE_CHECKING:
+    from palpate.export.answer_network import AnswerNetwork
+
 __all__ = [
+    "ANSWER_NETS",
     "ARRAYS",
     "BASELINE",
     "FIELD",
     "FIELD_NET",
     "LANES",
+    "MOTION",
     "NET",
     "ROOT",
     "VERSION",
@@ -61,6 +66,7 @@ HEAD, NUMBERS, LIMITS, POINTS, AXES, NET, ROOT, BASELINE, MEMORY, FIELD, FIELD_N
     36,
     44,
 )
+ANSWER_NETS, RUNS, MOTION = (NET, BASELINE, BASELINE + 5), 22, 60  # see core/answers.c, core/fmi_motion.c
 ROOM = 12  # arrays that a baseline may have, and a memory
 ENDLESS = 1e30  # number that stands for infinity
 FAR = 1e15  # coordinate of points that fill up a row
@@ -204,6 +210,37 @@ class WeightsBlock:
         tables[LIMITS] = Table.of(np.array([low, high, high - low]))
         return cls(tables)
 
+    @classmethod
+    def of_answers(cls, answers: AnswerNetwork) -> WeightsBlock:
+        """Return the block of a surrogate that no hand feels; see core/answers.c.
+
+        Raises
+        ------
+        UsageError
+            If a network is larger than the core's workspace, or the parts have more trained regions than it holds.
+        """
+        if len(answers.regions) > ROOM:
+            raise UsageError(
+                f"{len(answers.regions)} trained regions are more than the {ROOM} of the evaluator core.",
+                why="Each part that was learnt from other samples has a region of its own.",
+                fix="Learn all parts from one dataset.",
+            )
+        tables: dict[int, Table] = {}
+        for place, network in zip(ANSWER_NETS, answers.networks, strict=False):
+            tables |= net_tables(network, place, 0)
+        low, high = bounds(answers.inputs)
+        sizes = [len(answers.inputs), 0, 0, 0, len(answers.networks[0].outputs), -1, 0]
+        radii = np.zeros(ROOM)
+        for i, region in enumerate(answers.regions):
+            radii[i] = region.radius
+            tables[MEMORY + i] = Table.of(_points(region))
+        tables |= {HEAD: Table.of(np.array(sizes)), LIMITS: Table.of(np.array([low, high, high - low]))}
+        tables[NUMBERS] = Table.of(radii)
+        if answers.runs:
+            runs = [[run.first, run.count, int(run.largest)] for run in answers.runs]
+            tables[RUNS] = Table.of(np.array(runs))
+        return cls(tables)
+
     @property
     def hash(self) -> str:
         """SHA-256 of the arrays, in hexadecimal digits."""
@@ -317,16 +354,21 @@ def _energy_tables(energy: LearntEnergy, *, deviation: bool) -> dict[int, Table]
     tables[LIMITS] = Table.of(np.array([low, high, going.widths]))
     tables[AXES] = Table.of(baseline.directions)
     if region is not None:
-        points = region.points.T
-        filled = np.full((len(points), -(-points.shape[1] // LANES) * LANES), FAR)
-        filled[:, : points.shape[1]] = points
-        tables[POINTS] = Table.of(filled)
+        tables[POINTS] = Table.of(_points(region))
     if deviation and energy.root is not None:
         root, some = energy.posterior
         # a block's shapes have no zeros: where no unit has a covariance, the first one has one of zero
         units = min(max(some.units, 1), energy.network.units)
         tables[ROOT] = _root_table(np.pad(root, [(0, units - some.units), (0, 0)]), units)
     return tables
+
+
+def _points(region: TrainedRegion) -> np.ndarray:
+    """Return the points of a region as columns, filled up with far ones to whole lanes."""
+    points = region.points.T
+    filled = np.full((len(points), -(-points.shape[1] // LANES) * LANES), FAR)
+    filled[:, : points.shape[1]] = points
+    return filled
 
 
 def _root_table(root: np.ndarray, units: int) -> Table:

@@ -36,12 +36,14 @@ int main(void) {
 #endif
     for (row = 0; row < question[1]; row++) {
 #if CHECK_NETWORK
-      static real x[OF(_INPUTS)], y[OF(_OUTPUTS)], slopes[OF(_OUTPUTS) * OF(_INPUTS)];
+      static real x[OF(_INPUTS)], y[OF(_OUTPUTS)], slopes[OF(_OUTPUTS) * OF(_INPUTS)], inside;
       take(x, OF(_INPUTS));
       OF(_jacobian)(x, y, slopes);
       give(slopes, OF(_OUTPUTS) * OF(_INPUTS));
       OF(_evaluate)(x, y);
       give(y, OF(_OUTPUTS));
+      inside = (real)OF(_inside)(x);
+      give(&inside, 1);
 #else
       static real x[3], p[OF(_PARAMETERS) + 1], answer[19], dt, flags;
       static real work[OF(_DEVIATION_WORK)], deviation;

@@ -16,7 +16,7 @@ static void renew_drag(Instance *c) {
   const double size = PP_ABS(scale) * PP_SQRT(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
   int32_t a, i;
   memset(c->drag, 0, sizeof c->drag);
-  if (d == 0.0 || (is_probe && !(size > 0.0)) || c->flags & (PP_TOO_DEEP | PP_NOT_A_NUMBER)) return;
+  if (d == 0.0 || c->moves || (is_probe && !(size > 0.0)) || c->flags & (PP_TOO_DEEP | PP_NOT_A_NUMBER)) return;
   for (a = 0; a < felt; a++) {
     double along = 0.0, axis[3], pull;
     for (i = 0; i < 3; i++) {
@@ -45,14 +45,39 @@ static void check_step(Instance *c, double dt) {
   say(c, WARNING, text);
 }
 
+/* The answers that no hand feels, at the inputs; nothing is in the region that is not a number. */
+static void renew_answers(Instance *c) {
+  const int32_t count = pp_answer_count(&c->model);
+  int32_t i;
+  pp_answers(&c->model, c->now.p, c->answers + count, c->answers);
+  c->flags = pp_answers_inside(&c->model, c->now.p) ? PP_TRUSTED : 0;
+  for (i = 0; i < count; i++) {
+    if (!pp_finite(c->answers[i])) c->flags = PP_NOT_A_NUMBER;
+  }
+}
+
+static void warn_outside(Instance *c) {
+  if (c->flags & PP_TRUSTED) {
+    c->now.warned = 0;
+  } else if (!c->now.warned && !c->probing && (c->now.phase & RUNNING)) {
+    c->now.warned = 1;
+    say(c, WARNING, c->flags & PP_NOT_A_NUMBER ? "An input is not a finite number, or too large to be answered." : "The place is outside of the trained region.");
+  }
+}
+
 /* Renew the answer, and warn once where the place leaves the trained region.
  *
  * In co-simulation the force of a body with a memory is that of its last step; while derivatives are asked for it is that
  * which the same step would have ended in. In model exchange it follows place and states at once. */
 static void renew(Instance *c) {
   if (c->known) return;
-  c->flags = pp_answer(&c->model, c->now.x, c->now.p, c->answer);
   c->known = 1;
+  if (c->untouched) {
+    renew_answers(c);
+    warn_outside(c);
+    return;
+  }
+  c->flags = pp_answer(&c->model, c->now.x, c->now.p, c->answer);
   c->deviated = c->rated = 0;
   c->stored = c->size ? c->numbers[0] : 0.0;
   c->lost = c->size ? c->numbers[1] : 0.0;
@@ -68,16 +93,15 @@ static void renew(Instance *c) {
   }
   if (c->flags & (PP_TOO_DEEP | PP_NOT_A_NUMBER)) memset(c->now.force, 0, sizeof c->now.force);
   renew_drag(c);
-  if (c->flags & PP_TRUSTED) {
-    c->now.warned = 0;
-  } else if (!c->now.warned && !c->probing && (c->now.phase & RUNNING)) {
-    c->now.warned = 1;
-    say(c, WARNING, c->flags & PP_NOT_A_NUMBER ? "An input is not a finite number, or too large to be answered." : "The place is outside of the trained region.");
-  }
+  warn_outside(c);
 }
 
 static const double *rates(Instance *c) {
   renew(c);
+  if (c->moves) {
+    motion_rates(c, c->now.motion, c->rates);
+    return c->rates;
+  }
   if (!c->rated) {
     double force[3], stored = c->stored;
     memcpy(force, c->now.force, sizeof force);
@@ -116,7 +140,11 @@ static int take_step(Instance *c, double time, double step) {
   if (!(step >= 0.0) || !pp_finite(step) || !pp_finite(time)) return refuse(c, "A step takes a finite time that is not negative.");
   renew(c);
   if (c->flags & PP_NOT_A_NUMBER) return DISCARD;
-  advance(c, step);
+  if (c->moves && !carry_mass(c, step)) {
+    say(c, WARNING, "The mass can't be followed over this step: its path leaves all numbers, or it is too light for the stiffness.");
+    return DISCARD;
+  }
+  if (!c->moves && !c->untouched) advance(c, step);
   c->now.time = time + step;
   return OK;
 }
@@ -134,8 +162,37 @@ static int32_t rate_of(const Instance *c, uint32_t v) {
 
 static int is_parameter(const Instance *c, uint32_t v) { return v >= PARAMETER && v < PARAMETER + (uint32_t)c->parameters; }
 
+/* the answer that no hand feels of a value reference, or -1 */
+static int32_t answer_of(const Instance *c, uint32_t v) {
+  return c->untouched && v >= ANSWER && (int64_t)v - ANSWER < pp_answer_count(&c->model) ? (int32_t)(v - ANSWER) : -1;
+}
+
+static double state_value(const Instance *c, int32_t i) {
+  return c->moves ? c->now.motion[i] : pp_state(&c->model, c->numbers, i);
+}
+
+static void set_state_value(Instance *c, int32_t i, double value) {
+  if (!c->moves) {
+    pp_set_state(&c->model, c->numbers, i, value);
+    return;
+  }
+  c->now.motion[i] = value;
+  move_to(c);
+}
+
 /* 0 where there is no real variable of this reference */
 static int value_of(Instance *c, uint32_t v, double *value) {
+  if (c->untouched) {
+    if (v == TIME) *value = c->now.time;
+    else if (is_parameter(c, v)) *value = c->now.p[v - PARAMETER];
+    else if (answer_of(c, v) < 0) return 0;
+    else {
+      renew(c);
+      *value = c->answers[answer_of(c, v)];
+    }
+    return 1;
+  }
+  if (motion_value(c, v, value)) return 1;
   if (v < 3) *value = c->now.x[v];
   else if (v == SCALE) *value = c->now.scale;
   else if (v == DAMPING) *value = c->now.damping;
@@ -143,7 +200,7 @@ static int value_of(Instance *c, uint32_t v, double *value) {
   else if (v == TIME) *value = c->now.time;
   else if (is_parameter(c, v)) *value = c->now.p[v - PARAMETER];
   else if (v >= STATE) {
-    if (state_of(c, v) >= 0) *value = pp_state(&c->model, c->numbers, state_of(c, v));
+    if (state_of(c, v) >= 0) *value = state_value(c, state_of(c, v));
     else if (rate_of(c, v) >= 0) *value = rates(c)[rate_of(c, v)];
     else return 0;
   } else {
@@ -164,13 +221,16 @@ static int value_of(Instance *c, uint32_t v, double *value) {
 
 /* whether the variable could be set */
 static int set_value(Instance *c, uint32_t v, double value) {
-  if (v < 3) c->now.x[v] = value;
+  if (c->untouched && !is_parameter(c, v)) return 0;
+  if (c->moves && v == MASS && !(value > 0.0)) return 0;
+  if (c->moves && v >= PUSH && v < PUSH + 3) c->now.push[v - PUSH] = value;
+  else if (v < 3 && !c->moves) c->now.x[v] = value;
   else if (v == SCALE && pp_finite(value)) c->now.scale = value;
   else if (v == DAMPING && pp_finite(value) && value >= 0.0) c->now.damping = value;
   else if (v == MASS && pp_finite(value) && value >= 0.0) c->now.mass = value;
   else if (is_parameter(c, v)) c->now.p[v - PARAMETER] = value;
   else if (state_of(c, v) >= 0 && (c->now.phase & (INSTANTIATED | INITIALIZING))) {
-    pp_set_state(&c->model, c->numbers, state_of(c, v), value);
+    set_state_value(c, state_of(c, v), value);
     c->now.remembers = 1;
   } else return 0;
   c->known = 0;
@@ -268,14 +328,14 @@ static int read_moment(Instance *c, const void *bytes, size_t size, void **momen
 static int get_states(Instance *c, double *values, size_t count) {
   int32_t i;
   if ((int64_t)count != c->states || (count && !values)) return refuse(c, "There is another number of continuous states.");
-  for (i = 0; i < c->states; i++) values[i] = pp_state(&c->model, c->numbers, i);
+  for (i = 0; i < c->states; i++) values[i] = state_value(c, i);
   return OK;
 }
 
 static int set_states(Instance *c, const double *values, size_t count) {
   int32_t i;
   if ((int64_t)count != c->states || (count && !values)) return refuse(c, "There is another number of continuous states.");
-  for (i = 0; i < c->states; i++) pp_set_state(&c->model, c->numbers, i, values[i]);
+  for (i = 0; i < c->states; i++) set_state_value(c, i, values[i]);
   c->known = 0;
   return OK;
 }
@@ -289,6 +349,14 @@ static int get_rates(Instance *c, double *values, size_t count) {
 static int get_nominals(Instance *c, double *values, size_t count) {
   int32_t i;
   if ((int64_t)count != c->states || (count && !values)) return refuse(c, "There is another number of continuous states.");
+  if (c->moves) { /* the trained way, and the speed of a vibration of that size */
+    const double *low = c->arrays[PP_LIMITS].real, *high = low + c->arrays[PP_LIMITS].n[1];
+    for (i = 0; i < c->states; i++) {
+      const int32_t a = i % felt_of(c);
+      values[i] = (high[a] - low[a]) * (i < felt_of(c) ? 1.0 : PP_SQRT(pp_most(c->stiff, 1.0) / c->now.mass));
+    }
+    return OK;
+  }
   for (i = 0; i < c->states; i++) values[i] = i < c->states - 1 ? c->usual : c->usual * c->usual;
   return OK;
 }

@@ -8,6 +8,7 @@
  * this step took: its length and what was remembered at its beginning are kept.
  */
 static int is_input(const Instance *c, uint32_t v) {
+  if (c->untouched) return is_parameter(c, v);
   return v < 3 || v == SCALE || v == DAMPING || v == MASS || is_parameter(c, v) || (c->exchange && state_of(c, v) >= 0);
 }
 
@@ -73,13 +74,14 @@ static int directional(Instance *c, const uint32_t *unknown, size_t unknowns, co
   if ((unknowns && (!unknown || !values)) || (knowns && (!known || !seed))) {
     return refuse(c, "Directional derivatives need references, seeds and room for values.");
   }
+  if (c->moves) return refuse(c, "A body that carries a mass has no directional derivatives.");
   c->damped = c->now.damping > 0.0;
   for (j = 0; j < knowns; j++) {
     c->damped |= known[j] == DAMPING;
     if (!is_input(c, known[j])) return refuse(c, "There is no input, parameter or state of this reference to derive by.");
   }
   for (i = 0; i < unknowns; i++) {
-    const int is_output = unknown[i] >= FX && unknown[i] <= (c->size ? LOST : DEVIATION) && unknown[i] != SCALE;
+    const int is_output = c->untouched ? answer_of(c, unknown[i]) >= 0 : unknown[i] >= FX && unknown[i] <= (c->size ? LOST : DEVIATION) && unknown[i] != SCALE;
     if (!is_output && !(c->exchange && rate_of(c, unknown[i]) >= 0)) {
       return refuse(c, "Only real outputs, and rates in model exchange, have directional derivatives.");
     }

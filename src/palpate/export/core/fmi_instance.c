@@ -28,18 +28,21 @@ enum { INSTANTIATED = 1, INITIALIZING = 2, EVENT = 4, CONTINUOUS = 8, STEPPING =
 #define SOLVER (INITIALIZING | EVENT | CONTINUOUS | TERMINATED)
 
 /* value references of real variables; parameters of the body follow from PARAMETER on, states from STATE on, and their
- * rates after those */
+ * rates after those; what no hand feels has its inputs from PARAMETER on and its answers from ANSWER on */
 enum {
   FX = 3, FY = 4, FZ = 5, ENERGY = 6, DEPTH = 7, DEVIATION = 8, SCALE = 9, STORED = 10, LOST = 11, TIME = 15, PARAMETER = 16,
-  DAMPING = 48, MASS = 49, STATE = 64
+  DAMPING = 48, MASS = 49, PUSH = 50, SPEED = 53, KINETIC = 56, STATE = 64, ANSWER = 1024
 };
 
 /* everything that changes while an instance lives; the memory's numbers follow it */
 typedef struct {
   double x[3], p[PP_MOST], scale, damping, mass, time, force[3], step; /* step: the last one's length */
   double from[3], to[3], velocity[3];                 /* places at the ends of the last step, and its mean velocity */
+  double motion[6], push[3];                          /* of a mass: ways, then speeds, along the felt directions; N */
   int phase, stepped, warned, slow, flags, remembers; /* flags at the last event; whether states were set by hand */
 } Moment;
+
+#define PP_MOTION 60 /* place of the array (mass, damping) of a body that carries a mass */
 
 typedef struct Instance Instance;
 struct Instance {
@@ -47,11 +50,11 @@ struct Instance {
   pp_model model;
   unsigned char *bytes;
   /* of the deviation; what the memory keeps now, before the last step, on trial, and meanwhile; rates */
-  double *work, *numbers, *before, *trial, *kept, *rates;
+  double *work, *numbers, *before, *trial, *kept, *rates, *answers; /* answers: those that no hand feels, then latent ones */
   Moment now, start;
   int32_t parameters, size, states;
-  int exchange, known, flags, deviated, rated, probing, damped;
-  double answer[PP_ANSWER], drag[3], deviation, usual, stored, lost;
+  int exchange, known, flags, deviated, rated, probing, damped, moves, untouched; /* untouched: no hand feels it */
+  double answer[PP_ANSWER], drag[3], deviation, usual, stored, lost, stiff;
   void (*tell)(Instance *, int, const char *, const char *);
   void (*logger)(void);
   void *environment;
@@ -156,8 +159,12 @@ static void free_instance(Instance *c) {
   free(c->work);
   free(c->numbers);
   free(c->rates);
+  free(c->answers);
   free(c);
 }
+
+static void start_motion(Instance *c);
+static double stiffness_of(const double *answer);
 
 /* the start that the description tells: the middle of the ranges, where a probe is as high as it may be */
 static void go_to_start(Instance *c) {
@@ -169,6 +176,10 @@ static void go_to_start(Instance *c) {
   c->now.scale = 1.0;
   c->now.mass = 0.05;
   for (i = 0; i < c->parameters; i++) c->now.p[i] = 0.5 * (low[felt + i] + high[felt + i]);
+  if (c->untouched) {
+    c->start = c->now;
+    return;
+  }
   for (i = 0; i < 3; i++) {
     if (pp_is_probe(c->arrays)) {
       deep[i] = i < 2 ? (low[i] + high[i]) / 2.0 : low[i];
@@ -177,10 +188,13 @@ static void go_to_start(Instance *c) {
       for (a = 0; a < felt; a++) deep[i] += c->arrays[PP_AXES].real[3 * a + i] * high[a];
     }
   }
+  if (c->moves) start_motion(c);
   c->start = c->now;
   /* the usual size of an amplitude, for solvers' tolerances: that of a deep press */
   pp_answer(&c->model, deep, c->now.p, answer);
   c->usual = PP_ABS(answer[PP_AMPLITUDE]);
+  c->stiff = stiffness_of(answer);
+  if (!pp_finite(c->stiff)) c->stiff = 0.0;
   if (!(c->usual > 0.0) || !pp_finite(c->usual)) c->usual = 1.0;
 }
 
@@ -209,11 +223,14 @@ static Instance *fill(Instance *c, const char *name, const char *hash, const cha
   free(path);
   if (!c->bytes) return fail(c, "The weights could not be read from %.400s.", resources);
   reason = pp_open(c->bytes, size, c->arrays);
+  c->untouched = reason == PP_UNKNOWN && pp_is_answers(c->arrays);
+  if (c->untouched) reason = pp_answers_fit(c->arrays) ? PP_OPEN : PP_MISFIT;
   if (reason != PP_OPEN || !same_weights(c->bytes, hash)) return fail(c, "resources/weights.bin %s.", reasons[reason]);
   c->model.a = c->arrays;
   c->parameters = c->arrays[PP_HEAD].whole[PP_INPUTS] - c->arrays[PP_HEAD].whole[PP_FELT];
   c->size = c->arrays[PP_HEAD].whole[PP_MEMORY_CODE] ? 4 + c->arrays[PP_HEAD].whole[PP_STATE] : 0;
-  c->states = pp_state_count(&c->model);
+  c->moves = !c->untouched && !c->size && pp_is(&c->arrays[PP_MOTION], 2, 1, 1) && c->arrays[PP_MOTION].real[0] > 0.0;
+  c->states = c->moves ? 2 * c->arrays[PP_HEAD].whole[PP_FELT] : pp_state_count(&c->model);
   c->exchange = exchange;
   if (exchange && c->size && !c->states) {
     return fail(c, "%s", "What this body remembers follows the path of the hand and no differential equation: take co-simulation.");
@@ -221,6 +238,10 @@ static Instance *fill(Instance *c, const char *name, const char *hash, const cha
   c->work = (double *)calloc((size_t)pp_deviation_size(&c->model) + 1, sizeof(double));
   c->numbers = (double *)calloc(4 * (size_t)c->size + 1, sizeof(double));
   c->rates = (double *)calloc((size_t)c->states + 1, sizeof(double));
+  if (c->untouched) {
+    c->answers = (double *)calloc((size_t)pp_answer_count(&c->model) + (size_t)pp_latent_count(&c->model), sizeof(double));
+    if (!c->answers) return fail(c, "%s", "There is no memory for an instance.");
+  }
   if (!c->work || !c->numbers || !c->rates) return fail(c, "%s", "There is no memory for an instance.");
   c->before = c->numbers + c->size;
   c->trial = c->before + c->size;

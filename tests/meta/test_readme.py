@@ -131,7 +131,7 @@ def test_the_page_on_commands_is_complete():
     known = commands()
     assert sorted(re.findall(r"^## palpate ([a-z-]+)", text, re.MULTILINE)) == sorted(known)
     named = set(re.findall(r"--[a-z][a-z-]+", text))
-    completing = {"--install-completion", "--show-completion"}  # of the program itself, by Typer
+    completing = {"--help", "--install-completion", "--show-completion"}  # of the program itself, by Typer
     assert named <= {option for options in known.values() for option in options} | completing
     # `palpate NAME` stands in the README's table for each of them
     assert {name for name in known if f"| `palpate {name}` |" in README} == set(known)
@@ -159,7 +159,10 @@ def repository_paths() -> tuple[str, ...]:
 
 
 def exists(path: str) -> bool:
-    return any(there.endswith("/" + path.strip("/.")) for there in repository_paths())
+    ends = [
+        "/" + path.strip("/.") + suffix for suffix in ("", ".in")
+    ]  # a file that is written has its template
+    return any(there.endswith(tuple(ends)) for there in repository_paths())
 
 
 @pytest.mark.grid

@@ -1,4 +1,4 @@
-"""Ten parts made by scripts, as people have them: STL, STEP, volume meshes; smooth, noisy, thin, hollow, two regions.
+"""Eleven parts made by scripts, as people have them: STL, STEP, volume meshes; smooth, noisy, grooved, thin.
 
 Each function writes one file and returns its path. None of them was made to suit palpate: each stands for a kind of
 part that people press (a lattice, a cup, a sponge, a limb, a scan, a bracket), with the triangles that its tool would
@@ -134,6 +134,27 @@ def hollow_heart(folder: Path) -> Path:
     return _stl(joined, np.concatenate([faces, len(points) + faces[:, ::-1]]), folder / "hollow-heart.stl")
 
 
+def grooved_organ(folder: Path) -> Path:
+    """Write an organ of 76 × 96 × 81 mm with five winding grooves of 4 mm width and 1.5 mm depth, noisy, as STL.
+
+    The grooves are narrower than the contact of a ball of 8 mm, which is 7 mm wide at a depth of 0.8 mm, and deeper
+    than that; each corner has the noise of a scanner.
+    """
+    from trimesh.creation import icosphere
+
+    sphere, rng = icosphere(subdivisions=5), np.random.default_rng(11)
+    unit = np.array(sphere.vertices)
+    x, y, z = unit.T
+    lobes = 1 + 0.05 * np.sin(3 * x + 1) * np.cos(2 * y) + 0.03 * np.cos(4 * z + x)
+    points = unit * (38, 48, 40.5) * lobes[:, None]
+    # height in the grooves' own wave: they lie 13 mm apart and wind by 6 mm
+    phase = points[:, 1] + 6 * np.sin(points[:, 0] / 9) * np.cos(points[:, 2] / 14)
+    beside = np.abs((phase + 6.5) % 13 - 6.5)
+    depth = 1.5 * np.exp(-((beside / 1.4) ** 2)) * (np.abs(y) < 0.7)
+    moved = points - depth[:, None] * unit + 0.04 * rng.standard_normal(points.shape)
+    return _stl(moved, np.array(sphere.faces), folder / "grooved-organ.stl")
+
+
 PARTS: dict[str, Callable[[Path], Path]] = {
     function.__name__: function
     for function in (
@@ -147,6 +168,7 @@ PARTS: dict[str, Callable[[Path], Path]] = {
         layered_skin,
         bent_finger,
         hollow_heart,
+        grooved_organ,
     )
 }
 

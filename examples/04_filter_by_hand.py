@@ -15,10 +15,10 @@ settings = Settings(
     distance_min=0.1,
     noise=1e-4,
     regression_limit=2.0,
-    prune_below=0.05,
-    prune_after=30,
+    prune_below=0.1,
+    prune_after=20,
 )
-rng = np.random.default_rng(0)
+rng = np.random.default_rng(2)
 
 
 def truth(x):

@@ -12,7 +12,7 @@ sys.path += [str(Path(__file__).parent / "surrogates" / part) for part in ("", "
 
 import skins
 from field_made import field
-from touch_made import PROBE, SOFT, ball, inside_points, touch_energy
+from touch_made import PROBE, SOFT, ball, inside_points, overlap_baseline, touch_energy
 
 import palpate as pp
 from held import pad, yielding_rod
@@ -121,10 +121,16 @@ def _block() -> pp.Surrogate:
     )
 
 
+def _grooved() -> pp.Surrogate:
+    """A face with a groove, by the overlap of the ball."""
+    return pp.Surrogate(touch_energy(baseline=overlap_baseline()), meta={"name": "grooved"})
+
+
 BODIES = {
     "contact": _block,
     "relaxation": _organ,
     "closed": _egg,
+    "overlap": _grooved,
     "indentation": _yielding,
     "pad": _glued_pad,
     "constant": _node,

@@ -394,7 +394,7 @@ class PartOptions(Options):
     )
     depth: float | None = option(
         None,
-        "largest depth of the ball. Default: its radius, at most a quarter of the thickness beneath",
+        "largest depth of the ball. Default: three quarters of its radius, at most a quarter of the thickness beneath",
         "m",
         above=0,
         bare=False,

@@ -138,7 +138,8 @@ def _sentence(item: Any, place: _Place, model: type[BaseModel]) -> str:
         text = f"{'an entry' if isinstance(item['loc'][-1], int) else 'this key'} is missing{_example(place.fields)}"
     elif kind == "extra_forbidden":
         known = {str(key) for form in _place(item["loc"][:-1], model).forms for key in _fields(form)}
-        text = f"there is no such key{_close(str(item['loc'][-1]), known)}"
+        word = str(item["loc"][-1])  # known, it is one of the same table of another kind
+        text = f"there is no such key{' here' if word in known else _close(word, known)}"
     elif kind in {"literal_error", "union_tag_invalid", "union_tag_not_found"}:
         text = _none_of(item, place, shown)
     elif kind in _BOUNDS:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -223,3 +224,18 @@ def test_a_missing_file_is_named(palpate, tmp_path):
     answer = palpate("ask", tmp_path / "none.palpate")
     assert answer.code == 2
     assert "none.palpate" in answer.err
+
+
+@pytest.mark.parametrize("is_beam", [False, True])
+def test_the_command_that_a_file_prints_asks_it(palpate, file, tmp_path, is_beam):
+    """A beam is asked by its loads, not by the place of its node; names of files may have blanks."""
+    path = tmp_path / "my model.palpate"
+    path.write_bytes(file.read_bytes())
+    if is_beam:
+        spring_beam(stiffness=20.0).save(path)
+    (line,) = (one for one in palpate("ask", path).out.splitlines() if one.startswith("ask it"))
+    program, *words = shlex.split(line.removeprefix("ask it"), comments=True)
+    assert program == "palpate"
+    answer = palpate(*words)
+    assert answer.code == 0, answer.err
+    assert ("tip in N" in line) == is_beam

@@ -8,6 +8,7 @@ import subprocess
 
 import pytest
 
+from answering import answering
 from exported_bodies import body, networks
 from system_programs import require_program
 
@@ -54,6 +55,14 @@ def test_a_network_goes_out_as_c_alone(palpate, tmp_path):
         assert "holds a network alone" in answer.err
         assert "palpate export c` or `palpate export onnx" in answer.err
         assert not (tmp_path / kind).exists()
+
+
+def test_a_model_without_touch_goes_out_as_a_page(palpate, tmp_path):
+    file = answering(fields=False).save(tmp_path / "rod.palpate")
+    answer = palpate("export", "html", file)
+    assert answer.code == 0, answer.err
+    assert "computes its answers by itself" in answer.err + answer.out
+    assert 'data-mode="answers"' in (tmp_path / "rod-page.html").read_text(encoding="utf-8")
 
 
 def test_bad_names_and_fields_are_refused(palpate, pad, tmp_path):

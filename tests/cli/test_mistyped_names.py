@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shlex
 import subprocess
 import sys
 
@@ -31,6 +33,53 @@ def test_a_command_that_is_none_finds_the_one_that_is_meant(palpate, words, mean
     assert answer.code == 2
     assert answer.err.splitlines()[0].startswith("error: There is no command `palpate ")
     assert f"Did you mean `{meant}`?" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("words", "what", "fix"),
+    [
+        ("touch kidney.stl --materal liver", "`palpate touch` has no option --materal.", "Did you mean --material?"),
+        ("export html k.palpate --oot k", "`palpate export html` has no option --oot.", "Did you mean --out?"),
+        ("--versoin", "`palpate` has no option --versoin.", "Did you mean --version?"),
+        ("touch", "`palpate touch` needs PART.", "For example `palpate touch kidney.stl`."),
+        ("material fit", "`palpate material fit` needs FILES.", "For example `palpate material fit tests.csv`."),
+        ("ask a b", "`palpate ask`: got unexpected extra argument", "`palpate ask --help` says what it takes."),
+        ("view k --token=3", "`palpate view`: option '--token' does not take a value.", "`palpate view --help`"),
+        ("export kidney.palpate", "", "Did you mean `palpate export html kidney.palpate`?"),
+        ("export kidney.zarr", "", "Did you mean `palpate dataset export kidney.zarr`?"),
+        ("kidney.stl", "", "Did you mean `palpate touch kidney.stl`?"),
+        ("'my study.toml'", "", "Did you mean `palpate sweep 'my study.toml'`?"),
+    ],
+)  # fmt: skip
+def test_a_wrong_option_or_argument_is_refused_as_a_wrong_command_is(palpate, words, what, fix):
+    answer = palpate(*shlex.split(words))
+    assert answer.code == 2
+    first, *rest = answer.err.splitlines()
+    assert first.startswith("error: ")
+    assert what in first
+    assert fix in "\n".join(rest)
+    assert "╭" not in answer.err
+    if what:
+        told = json.loads(palpate(*shlex.split(words), "--json").out)["error"]
+        assert what in told["what"]
+
+
+@pytest.mark.parametrize("path", ["", "touch", "export html", "devices simulate"])
+def test_a_short_h_prints_the_help(palpate, path):
+    answer = palpate(*path.split(), "-h")
+    assert (answer.code, answer.out) == (0, palpate(*path.split(), "--help").out)
+    assert "Usage: " in answer.out
+
+
+def test_studies_beside_are_offered_where_none_is_named(palpate, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pyproject.toml").write_text("[project]\nname = 'other'\n", encoding="utf-8")
+    assert "Did you mean" not in palpate("sweep").err
+    assert palpate("init", "my.toml").code == 0
+    for command in ("sweep", "learn", "validate"):
+        answer = palpate(command)
+        assert answer.code == 2
+        assert answer.err.startswith("error: study.toml does not exist.\nDid you mean my.toml?")
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 import urllib.request
+from dataclasses import replace
 from http.cookiejar import CookieJar
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,14 +28,16 @@ from palpate.cli.console import Console
 from palpate.cli.improvement_lines import mesh_in_words, trial_in_words
 from palpate.cli.touch_page import TouchedPart
 from palpate.errors import UsageError
+from palpate.format import share
 from palpate.runtime import warm_up
 from palpate.study import Study
 from palpate.study.part_choices import shown_part
 from palpate.study.part_study import part_study
 from palpate.study.part_work import rough_study, work_on
 from palpate.study.run import Paths
+from palpate.surrogates import Surrogate
 from palpate.viewer.part_messages import StartWish
-from palpate.viewer.part_page import serve_part
+from palpate.viewer.part_page import Progress, serve_part
 
 
 @pytest.fixture
@@ -151,6 +154,71 @@ def test_the_same_command_goes_on_with_what_there_is(study, tmp_path, monkeypatc
     said = carried_out(study, tmp_path)
     assert bodies(said[:1]) == ["pad.palpate"], "what was learnt before can be touched at once"
     assert [name for name, _, _ in work.studies] == ["pad-rough", "pad", "pad"]
+
+
+def test_the_error_that_an_earlier_run_found_is_told_at_once(study, tmp_path, monkeypatch):
+    Improvement(monkeypatch)
+    carried_out(study, tmp_path)
+    file = tmp_path / "pad.palpate"
+    model = Surrogate.load(file)
+    assert "judged" not in carried_out(study, tmp_path)[0], "its file does not tell"
+    curve = [{"solves": 12, "force_median": 0.01, "force_p95": 0.03}]
+    curve.append({"solves": 16, "force_median": 0.004, "force_p95": 0.0094})
+    replace(model, meta={**model.meta, "learning_curve": curve}).save(file)
+    assert carried_out(study, tmp_path)[0]["judged"] == {"solves": 16, "median": 0.004, "error": 0.0094}
+
+
+class Saying(list[dict]):
+    """Work that says these lines, and solves nothing."""
+
+    def ask(self, line: str) -> None:
+        pass
+
+    def close(self) -> int:
+        return 0
+
+
+def test_a_known_error_is_told_until_the_new_one_is_there(tmp_path, monkeypatch, capsys):
+    """Of an earlier run, it stays until the same surrogate is judged; of the one before, it is said in words."""
+
+    def step(phase: str, solves: int, error: float) -> dict:
+        more = {"unseen": 8, "seconds": 1.0, "before": math.nan, "tried": math.nan, "mesh": math.nan}
+        return {
+            "phase": phase,
+            "solves": solves,
+            "error": error,
+            "median": error / 2,
+            "is_new": True,
+            "places": [],
+        } | more
+
+    work = Saying([
+        {"judged": {"solves": 16, "median": 0.004, "error": 0.0094}},
+        {"step": step("learnt", 16, math.nan)},
+        {"step": step("judged", 16, 0.01)},
+        {"step": step("learnt", 12, math.nan)},  # a study's own after the rough one
+        {"step": step("judged", 12, 0.008)},
+        {"ended": {"reached": False, "reason": "The time is over.", "report": ""}},
+    ])  # fmt: skip
+    monkeypatch.setattr("palpate.cli.touch_page._Work", lambda: work)
+    monkeypatch.setattr("palpate.cli.touch_page.WarmUp", lambda *names: SimpleNamespace(close=lambda: None))
+    shown: list[Progress] = []
+    ended = threading.Event()
+    touched = TouchedPart(0.02, 60.0, 1, Console())
+    touched.page = SimpleNamespace(
+        show_progress=shown.append, end=lambda words: ended.set(), stopped=threading.Event()
+    )
+    touched.begin(lambda: tmp_path / "no.toml")
+    assert ended.wait(10.0)
+    touched.close()
+    lines = capsys.readouterr().err
+    assert "16 solves: a first surrogate" not in lines, "it is no first one"
+    assert lines.count("8 unseen solves, after") == 2
+    assert [progress.error_p95 for progress in shown] == pytest.approx(
+        [0.0094, 0.0094, 0.01, math.nan, 0.008, 0.008], nan_ok=True
+    )
+    words = f"{share(0.01)} before; the new one is being checked"
+    assert [progress.trial for progress in shown] == ["", "", "", words, "", ""]
 
 
 def test_a_surrogate_of_another_study_is_not_put_into_the_hand(study, tmp_path, monkeypatch):

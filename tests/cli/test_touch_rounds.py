@@ -112,6 +112,26 @@ def test_options_that_are_refused_leave_no_study_behind(palpate, tmp_path, optio
     assert list(tmp_path.iterdir()) == [part]
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--depth", "20 mm"), "The depth of 20 mm is more than the part is thick, 20 mm."),
+        (("--radius", "21 mm"), "The ball, 42 mm across, is larger than the part, 40 mm."),
+        (("--element", "9 mm", "--radius", "4 mm"), "The elements, 9 mm, are larger than the ball, 8 mm."),
+    ],
+)
+def test_a_number_that_the_page_refuses_is_refused_before_anything_is_written(
+    palpate, asked, tmp_path, options, words
+):
+    part = box(tmp_path / "pad.stl")
+    for command in (("touch", part, "--no-view"), ("init", part)):
+        answer = palpate(*command, *options)
+        assert answer.code == 2, answer.err
+        assert words in answer.err.replace("\N{NO-BREAK SPACE}", " ")
+        assert list(tmp_path.iterdir()) == [part]
+    assert not asked
+
+
 @pytest.mark.full
 def test_a_choice_that_does_not_suit_is_no_missed_target(palpate, asked, tmp_path):
     answer = palpate("touch", box(tmp_path / "pad.stl"), "--poisson", "0.7", "--no-view")

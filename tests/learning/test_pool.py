@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -37,7 +38,7 @@ def problem():
     return EnergyProblem(X, known, None)
 
 
-def program(text, *arguments, stdin=False):
+def program(text, *arguments, stdin=False, **options):
     """A Python program that finds this file and what this process finds, given as -c or by standard input."""
     here = [os.path.dirname(__file__), *sys.path]
     return subprocess.Popen(
@@ -46,6 +47,7 @@ def program(text, *arguments, stdin=False):
         stdout=subprocess.PIPE,
         text=True,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(here), "OMP_NUM_THREADS": "1"},
+        **options,
     )
 
 
@@ -124,6 +126,27 @@ def test_processes_end_with_the_one_that_started_them():
             time.sleep(0.05)
         first.kill()
     assert not psutil.wait_procs(second, timeout=60.0)[1]
+
+
+@pytest.mark.full
+@pytest.mark.skipif(os.name == "nt", reason="SIGTERM is POSIX")
+def test_sigterm_ends_it_without_a_traceback():
+    text = (
+        "import signal, time; from palpate.learning.pool import Pool; from palpate.processes import end_by_sigterm\n"
+        "signal.signal(signal.SIGTERM, end_by_sigterm)\n"
+        "print('begun', flush=True); Pool(2).map(time.sleep, [0.2] * 500)\n"
+    )
+    with program(text, stderr=subprocess.PIPE) as first:
+        assert first.stdout.readline() == "begun\n"
+        until = time.monotonic() + 60.0
+        while len(_workers(first.pid)) < 2:
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        time.sleep(1.0)  # they have begun with the work, most of which waits
+        first.terminate()
+        _, errors = first.communicate(timeout=60.0)
+    assert first.returncode == 128 + signal.SIGTERM
+    assert not errors
 
 
 def _workers(pid):

@@ -119,7 +119,7 @@ def test_every_command_named_exists(page: Path):
     known = commands()
     for line in code(page.read_text(encoding="utf-8")).splitlines():
         for call in re.split(r"&&|;", line):
-            if found := re.match(r"\s*palpate ([a-z]+)\b(.*)", call):
+            if found := re.match(r"\s*palpate ([a-z]+(?:-[a-z]+)*)\b(.*)", call):
                 name, rest = found.groups()
                 assert name in known, line
                 unknown = set(re.findall(r"(?<!\S)--[a-z-]+", rest)) - known[name]
@@ -129,7 +129,7 @@ def test_every_command_named_exists(page: Path):
 def test_the_page_on_commands_is_complete():
     text = (ROOT / "docs" / "guide" / "commands.md").read_text(encoding="utf-8")
     known = commands()
-    assert sorted(re.findall(r"^## palpate ([a-z]+)", text, re.MULTILINE)) == sorted(known)
+    assert sorted(re.findall(r"^## palpate ([a-z-]+)", text, re.MULTILINE)) == sorted(known)
     named = set(re.findall(r"--[a-z][a-z-]+", text))
     completing = {"--install-completion", "--show-completion"}  # of the program itself, by Typer
     assert named <= {option for options in known.values() for option in options} | completing
@@ -175,9 +175,12 @@ def test_every_path_named_exists(page: Path):
 def test_the_reference_has_every_public_name():
     text = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "reference").glob("*.md"))
     import palpate
+    import palpate.adapters
 
-    listed = [path.rpartition(".")[2] for path in re.findall(r"^::: palpate\.(\S+)", text, re.MULTILINE)]
-    assert sorted(listed) == sorted(palpate.__all__)
+    paths = re.findall(r"^::: palpate\.(\S+)", text, re.MULTILINE)
+    for package, inside in ((palpate, False), (palpate.adapters, True)):
+        listed = [path.rpartition(".")[2] for path in paths if path.startswith("adapters.") == inside]
+        assert sorted(listed) == sorted(package.__all__)
 
 
 def test_every_page_is_in_the_navigation():

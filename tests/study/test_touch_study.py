@@ -104,6 +104,7 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
         ),
         ('[body]\nkind = "block"\n[sweep]\nsamples = 8\ndepths = 9', "no depth series"),
         ('[body]\nkind = "block"\n[learning]\nsecond = 3', "learning.second: there is no such key"),
+        ("[learning]\nseconds = 3", "learning.seconds: there is no such key here"),
         ('[body]\nkind = "layered"', "body.layers"),
         ('[body]\nkind = "block"\n[[varied]]\npath = "young"\nlow = "2 mm"\nhigh = 1', "varied.0.low"),
         ('[body]\nkind = "block"\n[[varied]]\npath = "young"\nlow = 2\nhigh = 1', "is no range"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from surrogate_checks import CHECKS, MEMORY_CHECKS, Example
 from test_pad_energy import made as pad_energy
-from touch_made import around_points, touch_energy, undisturbed
+from touch_made import around_points, overlap_baseline, touch_energy, undisturbed
 
 import palpate as pp
 from models import linear_network
@@ -35,6 +35,15 @@ INF = np.inf
 def contact() -> Example:
     """A sphere on a plane; derivatives of its distance jump at the nodes of a table."""
     energy = touch_energy()
+    rest = around_points(100)
+    rest[:, 2] += 0.03
+    return Example(pp.Surrogate(energy), rest, undisturbed(energy, around_points(1500), 1e-4))
+
+
+@functools.cache
+def overlap() -> Example:
+    """A sphere over a groove, by its overlap."""
+    energy = touch_energy(baseline=overlap_baseline())
     rest = around_points(100)
     rest[:, 2] += 0.03
     return Example(pp.Surrogate(energy), rest, undisturbed(energy, around_points(1500), 1e-4))
@@ -80,7 +89,7 @@ def _region(n: int) -> TrainedRegion:
     return TrainedRegion.of(np.random.default_rng(1).uniform(-1.0, 1.0, (200, n)))
 
 
-BODIES = (contact, pad, node, constant)
+BODIES = (contact, overlap, pad, node, constant)
 
 
 def relaxation(q: float) -> Memory:

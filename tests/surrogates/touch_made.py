@@ -8,6 +8,8 @@ import numpy as np
 
 from palpate.network import Network, Scaling, TrainedRegion
 from palpate.surrogates import ContactBaseline, ContactLaw, Continuation, LearntEnergy, TouchedSurface
+from palpate.surrogates.baselines import OverlapBaseline
+from palpate.surrogates.surface import Overlap
 from palpate.units import Quantity, Range, bounds
 
 RADIUS = 0.010
@@ -66,6 +68,29 @@ def ball() -> TouchedSurface:
     return TouchedSurface.of(points, np.array(triangles), radius=0.006, reach=0.013, spacing=0.002)
 
 
+def ridges() -> tuple[np.ndarray, np.ndarray]:
+    """Points (P, 3) and triangles of a face of 80 mm with a groove along y, 4 mm wide and 1.5 mm deep."""
+    x, y = np.arange(-40.0, 41.0), np.linspace(-40.0, 40.0, 9)
+    points = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((81, 9))], axis=-1).reshape(-1, 3)
+    # not as high as the plane: there the deepest trained place would be on the edge of the range, to rounding
+    points[:, 2] = -0.3 - 1.5 * np.exp(-((points[:, 0] / 1.5) ** 2))
+    first = (9 * np.arange(80)[:, None] + np.arange(8)).ravel()
+    triangles = np.vstack(
+        [np.column_stack([first, first + 9, first + 10]), np.column_stack([first, first + 10, first + 1])]
+    )
+    return 1e-3 * points, triangles
+
+
+@functools.cache
+def overlap_baseline(weight: float = 1.0) -> OverlapBaseline:
+    """A ball over the groove of `ridges`, by its overlap."""
+    surface = TouchedSurface.of(*ridges(), radius=RADIUS, spacing=0.0025, shoulder=RADIUS / 3)
+    overlap = Overlap.of(surface, *ridges())
+    return OverlapBaseline(
+        ContactLaw("series", 1e-3), surface, RADIUS, overlap=overlap.field(weight), weight=weight
+    )
+
+
 def touch_energy(
     *, extra=(), surface=None, law=None, seed=1, deep=True, radius_at=None, **more
 ) -> LearntEnergy:
@@ -80,6 +105,7 @@ def touch_energy(
     }
     law = law or ContactLaw("series", 1e-3)
     baseline = ContactBaseline(law, surface or plane(), more.pop("radius", RADIUS), radius_at)
+    baseline = more.pop("baseline", baseline)
     return LearntEnergy(net, baseline, **(parts | more))
 
 

@@ -161,10 +161,13 @@ def test_positions_that_count_as_outside_are_explained() -> None:
     assert far == "4 of 4 hand positions count as outside the trained range."
 
 
-TOUCHED = {  # judged of an energy or a memory only
+TOUCHED = {  # judged of an energy or a memory only, or of answers that no hand feels
+    "answer_p95",
+    "answer_coverage",
     "history_force_median",
     "history_force_p95",
     "history_energy",
+    "mesh_force",
     "border_loop_work",
     "smoothness",
     "interval_coverage",

@@ -40,4 +40,6 @@ def test_a_record_is_left_with_what_a_person_reads():
         "learnt from": "solid of kidney.stl",
         "solved": "2026-11-26T15:20:03+00:00",
     }
+    bent = RECORD | {"solves": 25, "filter": {"samples": 251, "passes": 5}}
+    assert about_record(bent)["solves to learn from"] == 251, "as `palpate learn` says"
     assert not INTERNAL & set(about_record(dict.fromkeys(INTERNAL, "x")))

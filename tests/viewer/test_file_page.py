@@ -49,7 +49,7 @@ KEPT = """() => {
 @pytest.fixture(scope="module")
 def pressed() -> Surrogate:
     """A slab that relaxes, with a further input."""
-    return replace(family(), meta={"name": "slab"})
+    return replace(family(), meta={"name": "slab", "runtime": {"max_force": 12.0, "rate": 1000.0}})
 
 
 @pytest.fixture(scope="module")
@@ -124,6 +124,8 @@ def test_the_page_shows_its_model_card(opened: tuple[Page, list[str]], pressed: 
         *card["hashes"].values(),
     ):
         assert words in shown
+    assert page.locator("#meta dt:text-is('force limit') + dd").text_content() == "12 N"
+    assert "limited to 12 N" in " ".join(card["limits"])
     assert card["author"] not in shown, "nobody is told what the file does not say"
     assert "real-time loop" not in page.locator("#flags").inner_text()  # there is none that could be late
 

@@ -91,7 +91,7 @@ def test_the_second_page_watches(visit, keep, viewer: Viewer, rod: Surrogate):
     assert let_go(page)["flags"][0] == "free"
 
 
-def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complaints, rod: Surrogate):
+def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complaints, caplog, rod: Surrogate):
     with Viewer(rod, port=0) as viewer:
         page = visit(viewer)
         drag(page, -20, 100)
@@ -108,6 +108,11 @@ def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complain
     keep(page, "disconnected")
     page.evaluate("document.kept = true")
     with Viewer(rod, port=viewer.port, strict_port=True) as again:
+        expect(page.locator("#banner")).to_contain_text("Open the new address", timeout=10_000)
+        assert page.inner_text("#status") == "started again"
+        page.wait_for_timeout(4000)  # it asks on, and the terminal tells it once
+        (line,) = [record.getMessage() for record in caplog.records if "refused" in record.getMessage()]
+        assert "earlier start" in line
         page.context.request.get(again.url)  # as opening the new address in the same browser does
         settled(page, "free")
         assert page.evaluate("document.kept")
@@ -121,7 +126,7 @@ def test_the_end_of_the_loop_is_shown_and_the_page_returns(visit, keep, complain
         page.wait_for_selector("html[data-tick][data-tip]")
         assert not page.evaluate("document.kept")
         page.context.close()
-    known = ("ERR_CONNECTION_REFUSED", "403")  # no server, or one whose token it has not got yet
+    known = ("ERR_CONNECTION_REFUSED", "401", "403")  # no server, or one whose token it has not got yet
     assert_no([c for c in complaints if not any(word in c for word in known)])
     complaints.clear()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -287,6 +288,11 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
     assert page.inner_text("#phase") == "2 of 12 first solves"
     assert re.fullmatch(r", about (50|45|40|35|30) s", page.inner_text("#remaining"))
     assert 0.25 <= page.evaluate("document.getElementById('work-share').value") < 0.9
+    assert page.inner_text("#pressable").startswith("It can't be pressed yet.")
+    assert page.get_attribute("#pressable", "role") == "status", "it is read aloud when it changes"
+    page.wait_for_selector("#part-view[data-camera]")
+    page.wait_for_timeout(500)  # until the room above the part is drawn
+    stood = page.get_attribute("#part-view", "data-camera")
     assert page.is_hidden("#error-median"), "nothing is said of an error before there is one"
     keep(page, "part-solving")
     report = tmp_path / "slab.html"
@@ -296,6 +302,8 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
     server.show_progress(first)
     page.wait_for_selector("html[data-touching='1'][data-tick][data-middle]")
     page.wait_for_selector("#error-p95:text-is('3.1')")
+    assert page.inner_text("#pressable").startswith("You can press it now.")
+    assert page.get_attribute("#view", "data-camera") == stood, "the view stays when the part can be touched"
     assert 41 <= int(page.inner_text("#elapsed").split()[0]) < 60
     page.wait_for_function("document.getElementById('remaining').textContent === ', a little longer'")
 
@@ -304,16 +312,28 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
     assert float(page.evaluate("document.documentElement.dataset.largest")) == pytest.approx(
         100 * DEVIATION, rel=1e-3
     )
+    assert "not touched" in page.inner_text("#legend-note")
+    least, untouched = (colour(page, where) for where in ("#legend-bar", "#legend-note .untouched"))
+    assert np.ptp(least) > 80, "what is known best has a colour"
+    assert np.ptp(untouched) < 20, "what nobody touches is grey"
+    assert near(page, untouched) > 300, "the slab's sides"
     keep(page, "part-trust")
     page.click("#trust-toggle")
+    assert page.is_hidden("#legend-note")
     assert page.inner_text("#legend-title") == "displacement (mm)"
     page.evaluate("window.mark = 'not reloaded'")
     x, y = page.evaluate("document.documentElement.dataset.middle").split()
     page.mouse.move(float(x), float(y) + 10)
     page.mouse.down()
     check_displacement(versions[0], page)
+    assert page.inner_text("#deviation") == f"± {100 * DEVIATION:g}\N{NO-BREAK SPACE}%"
+    assert "Over all places it is 3.1\N{NO-BREAK SPACE}% at most" in page.inner_text("#deviation-note")
 
     server.show_body(versions[1])
+    before = "3.1 % before; the new one is being checked"
+    server.show_progress(dataclasses.replace(first, error_p95=math.nan, solves=24, trial=before))
+    page.wait_for_selector(f"#improved:text-is('{before}')")
+    assert page.is_hidden("#deviation-note"), "the new one is not checked yet"
     server.show_progress(dataclasses.replace(first, error_p95=0.028, solves=24))
     page.wait_for_selector("#error-p95:text-is('2.8')")
     assert page.inner_text("#improved") == "", "other solves judge the same body"
@@ -339,6 +359,23 @@ def test_a_part_is_touched_while_it_gets_better(server, page, study, versions, t
     server.end("Done: 2 % were reached.")
     page.wait_for_selector("#enough[hidden]", state="attached")
     assert page.inner_text("#phase") == "Done: 2 % were reached."
+
+
+def colour(page: Page, selector: str) -> np.ndarray:
+    """The first colour of an element's background, red, green and blue from 0 to 255."""
+    style = page.locator(selector).evaluate(
+        "e => getComputedStyle(e).backgroundImage + getComputedStyle(e).backgroundColor"
+    )
+    return np.array([int(n) for n in re.search(r"rgb\((\d+), (\d+), (\d+)\)", style).groups()])
+
+
+def near(page: Page, rgb: np.ndarray) -> int:
+    """Number of the picture's pixels in this colour, brighter or darker as the light makes it."""
+    content = page.locator("#view").screenshot()
+    pixels = 255 * plt.imread(io.BytesIO(content), format="png")[:, :, :3]
+    shade = pixels.mean(axis=2, keepdims=True) / rgb.mean()
+    flat = np.abs(pixels - shade * rgb).max(axis=2) < 6
+    return int((flat & (shade[:, :, 0] > 0.4) & (shade[:, :, 0] < 0.9)).sum())
 
 
 def check_displacement(file: Path, page: Page) -> None:

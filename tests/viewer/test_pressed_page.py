@@ -132,6 +132,7 @@ def test_the_wheel_presses_deeper_and_beyond_the_training_says_so(page: Page, ke
     keep(page, "pressed-outside")
     assert slab.energy.depth(check(slab, shown))[0] == pytest.approx(1.25 * pressed.DEEPEST, rel=1e-3)
     assert shown["text"]["trust"] == "outside"
+    assert shown["text"]["deviation"] == "not known", "nothing vouches for a figure there"
     assert "untrained" in page.inner_text("#depth-label")
     page.mouse.up()
     page.locator("#depth-wanted").fill(str(shallow))

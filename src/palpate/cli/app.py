@@ -230,7 +230,9 @@ def view(
     no_controller: NoController = False,
     dead_man: DeadMan = False,
 ) -> None:
-    """Open a page on which you can touch the model, with the mouse or a device. Only this machine can reach it."""
+    """Open a page on which you can touch the model, or set its inputs by sliders. Only this machine can reach it."""
+    if _shows_answers(model, port=port, browser=browser, strict_port=strict_port, token=token):
+        return
     _serve(
         model,
         port=port,
@@ -400,6 +402,26 @@ def doctor(
     from palpate.cli.doctor import report
 
     report(Console(as_json), seconds)
+
+
+def _shows_answers(model: Path, *, port: int | None, browser: bool, strict_port: bool, token: bool) -> bool:
+    """Serve the page of a surrogate without touch until interrupted; False, at once, for anything else."""
+    from palpate.learning.loading import load
+    from palpate.surrogates import Surrogate
+    from palpate.viewer.answer_viewer import show_answers
+
+    thing = load(model)
+    if not isinstance(thing, Surrogate) or thing.can_be_touched:
+        return False
+    show_answers(
+        thing,
+        name=model.stem,
+        port=8080 if port is None else port,
+        strict_port=strict_port,
+        token=token,
+        open_browser=browser and sys.stdout.isatty(),
+    )
+    return True
 
 
 def _serve(

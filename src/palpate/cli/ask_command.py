@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -46,11 +47,14 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         warning = _warning(contents)
         felt = getattr(contents, "can_be_touched", True)
         noun = _NOUNS.get(what, what) if felt else "A surrogate of numbers and fields"
-        names = ",".join(r.name for r in inputs)
+        line = _line_under_loads(contents)
+        asked = inputs if line is None else line.inputs  # a beam is asked by its loads
+        file, example = shlex.quote(str(model)), ",".join(f"{(r.low + r.high) / 2:.4g}" for r in asked)
+        names = ", ".join(f"{r.name} in {r.unit}" if r.unit else r.name for r in asked)
         ways = [
-            f"ask it   palpate ask {model} --at {names}",
-            f"record   palpate card {model}   (where it comes from, how good it is)",
-        ] * bool(names)
+            f"ask it   palpate ask {file} --at {example}   # {names}",
+            f"record   palpate card {file}   # where it comes from, how good it is",
+        ] * bool(asked)
         text = "\n".join([f"{noun} in {model}\n{contents}", *warning, *ways])
         console.result(text, content | _as_field(warning))
         return

@@ -14,6 +14,7 @@ from palpate.processes import CASE_LIMIT
 from palpate.runtime.warm_up import WarmUp
 from palpate.study import Study, preset_study
 from palpate.study.run import Outcome, Paths, carry_out, report_study
+from palpate.study.study_lock import hold_study
 from palpate.sweeps import LocalCluster, local_cluster
 
 __all__ = ["run_demo"]
@@ -61,14 +62,16 @@ def run_demo(
 def _carry_out(
     study: Study, folder: Path, cluster: LocalCluster, console: Console, case_limit: float
 ) -> Outcome:
-    return carry_out(
-        study,
-        Paths(folder, study.name),
-        cluster=cluster,
-        progress=not console.as_json,
-        case_limit=case_limit,
-        log=lambda stage: console.say(f"{study.name}: {stage} …"),
-    )
+    paths = Paths(folder, study.name)
+    with hold_study(paths, "palpate demo"):
+        return carry_out(
+            study,
+            paths,
+            cluster=cluster,
+            progress=not console.as_json,
+            case_limit=case_limit,
+            log=lambda stage: console.say(f"{study.name}: {stage} …"),
+        )
 
 
 def _content(outcomes: Sequence[Outcome], report: Path, seconds: float) -> dict[str, object]:

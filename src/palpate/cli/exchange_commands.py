@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,8 +12,12 @@ from palpate.cli.export_commands import export_app
 from palpate.cli.number_options import count_option, number_option
 from palpate.cli.table_options import Force, Json
 from palpate.errors import UsageError
-from palpate.number_text import whole_number
+from palpate.number_text import number_list, whole_number
 from palpate.output_files import require_outputs
+
+if TYPE_CHECKING:
+    from palpate.export.gltf import ShapeSeries
+    from palpate.surrogates import Surrogate
 
 __all__ = ["card", "export_dataset"]
 
@@ -27,7 +31,8 @@ Place = Annotated[
     str | None,
     typer.Option(
         help="Place of contact on the body's surface, x,y,z in m ([bold]palpate ask --at[/] takes the ball's centre); "
-        "the probe goes in against the surface there. Of a held body its displacement. Default: the middle."
+        "the probe goes in against the surface there. Of a held body its displacement, "
+        "of a model without touch its inputs. Default: the middle."
     ),
 ]
 Depth = Annotated[
@@ -38,6 +43,14 @@ Depth = Annotated[
         least=0,
         help="Largest depth of the probe in the surface, m. Default: the deepest trained one.",
     ),
+]
+
+Over = Annotated[
+    str | None,
+    typer.Option(help="Of a model without touch: the input that runs through its range, state by state."),
+]
+ColourField = Annotated[
+    str | None, typer.Option("--field", help="Of a model without touch: the field that colours it.")
 ]
 
 
@@ -166,11 +179,21 @@ def to_gltf(
     at: Place = None,
     depth: Depth = None,
     steps: Steps = 8,
+    over: Over = None,
+    field: ColourField = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the body under a stroke as glTF (GLB), with the deformation as morph targets, for viewers and web pages."""
-    _write(file, out, (".glb",), stroke=(at, depth, steps), force=force, console=Console(as_json))
+    _write(
+        file,
+        out,
+        (".glb",),
+        stroke=(at, depth, steps),
+        answers=(over, field),
+        force=force,
+        console=Console(as_json),
+    )
 
 
 @export_app.command("vtu")
@@ -183,11 +206,21 @@ def to_vtu(
     at: Place = None,
     depth: Depth = None,
     steps: Steps = 20,
+    over: Over = None,
+    field: ColourField = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the body under a stroke as VTU files and a PVD file, which ParaView plays."""
-    _write(file, out, (".pvd", ".vtu"), stroke=(at, depth, steps), force=force, console=Console(as_json))
+    _write(
+        file,
+        out,
+        (".pvd", ".vtu"),
+        stroke=(at, depth, steps),
+        answers=(over, field),
+        force=force,
+        console=Console(as_json),
+    )
 
 
 def _write(
@@ -196,10 +229,11 @@ def _write(
     endings: tuple[str, ...],
     *,
     stroke: tuple[str | None, float | None, int],
+    answers: tuple[str | None, str | None],
     force: bool,
     console: Console,
 ) -> None:
-    """Write the shapes of a stroke; by default to a file of the first ending beside the model."""
+    """Write the shapes of a stroke, or of inputs of a model without touch; by default beside the model."""
     from palpate.cli.drawn_stroke import reservations_about, stroke_of
     from palpate.export.shape_files import series_of_surrogate, write_shapes
     from palpate.surrogates import Surrogate
@@ -208,12 +242,57 @@ def _write(
     require_outputs([out], endings=endings, overwrite=force)
     at, depth, steps = stroke
     body = Surrogate.load(file)
-    X = stroke_of(body, steps, at, depth)
-    for warning in reservations_about(body, X):
-        console.say(f"warning: {warning}")
-    series = series_of_surrogate(body, X)
+    if body.can_be_touched:
+        if any(answers):
+            raise UsageError(
+                f"{file} is touched, and takes no --over and no --field.",
+                fix="Choose its stroke by --at and --depth.",
+            )
+        X = stroke_of(body, steps, at, depth)
+        for warning in reservations_about(body, X):
+            console.say(f"warning: {warning}")
+        series = series_of_surrogate(body, X)
+    else:
+        series = _series_of_inputs(body, at, depth, steps, answers)
+        series = series.from_first() if out.suffix.lower() == ".glb" else series
+        steps = len(series.values)
     path = write_shapes(series, out, targets=steps, card=body.card(file).as_dict(), overwrite=force)
     size = path.stat().st_size
     console.result(
         f"{path}  {size / 1e3:.0f} kB, {steps} states", {"file": str(path), "states": steps, "bytes": size}
     )
+
+
+def _series_of_inputs(
+    model: Surrogate, at: str | None, depth: float | None, steps: int, answers: tuple[str | None, str | None]
+) -> ShapeSeries:
+    """Return a model without touch at one place of its inputs, or over one of them."""
+    import numpy as np
+
+    from palpate.export.answer_shapes import series_of_answers
+    from palpate.format import count
+    from palpate.units import bounds, parse_quantity
+
+    over, field = answers
+    names, (low, high) = [r.name for r in model.inputs], bounds(model.inputs)
+    if depth is not None or (over is not None and over not in names):
+        raise UsageError(
+            f"{model.name!r} has no {'depth' if depth is not None else f'input {over!r}'}.",
+            why=f"Its inputs are {', '.join(names)}.",
+            fix="Choose their values by --at, in this order, and one that runs through its range by --over.",
+        )
+    words = [] if at is None else number_list(at)
+    if words and len(words) != len(names):
+        raise UsageError(
+            f"--at {at} has {count(len(words), 'number')}.",
+            fix=f"Give one for each of {', '.join(names)}, in SI units.",
+        )
+    place = (low + high) / 2.0
+    if words:
+        inputs = zip(words, model.inputs, strict=True)
+        place = np.array([parse_quantity(word, r.unit, r.name, bare=True) for word, r in inputs])
+    X = np.tile(place, (1 if over is None else max(steps, 2), 1))
+    if over is not None:
+        column = names.index(over)
+        X[:, column] = np.linspace(low[column], high[column], len(X))
+    return series_of_answers(model, X, field)

@@ -32,6 +32,12 @@ export_app = typer.Typer(
 LearntFile = Annotated[
     Path, typer.Argument(help="Model file (.palpate), of [bold]palpate learn[/] or [bold]palpate fit[/].")
 ]
+BodyFile = Annotated[
+    Path,
+    typer.Argument(
+        help="Model file (.palpate) of a body, of [bold]palpate learn[/] or [bold]palpate touch[/]."
+    ),
+]
 Folder = Annotated[
     Path | None, typer.Option(help="Folder for the files. Default: the file's name, beside it.")
 ]
@@ -166,7 +172,7 @@ def to_c(
 
 @export_app.command("lib")
 def to_library(
-    file: LearntFile,
+    file: BodyFile,
     out: Folder = None,
     name: Name = None,
     field: FieldName = None,
@@ -203,7 +209,7 @@ def to_library(
 
 @export_app.command("fmu")
 def to_fmu(
-    file: LearntFile,
+    file: BodyFile,
     out: OutFile = None,
     name: Name = None,
     fmi: Annotated[
@@ -265,7 +271,7 @@ def to_onnx(
 
 @export_app.command("html")
 def to_html(
-    file: LearntFile,
+    file: BodyFile,
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", help="File. Default: NAME-page.html beside the file NAME.palpate."),
@@ -274,14 +280,19 @@ def to_html(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write one HTML file with the body in it, which is touched in any browser: from disk, without a network."""
+    """Write one HTML file with the model in it, touched or asked in any browser: from disk, without a network."""
+    from palpate.learning.loading import load
+    from palpate.surrogates import Surrogate
     from palpate.viewer.file_page import export_html
 
-    thing, console = _body(file), Console(as_json)
+    loaded, console = load(file), Console(as_json)
+    answers = isinstance(loaded, Surrogate) and not loaded.can_be_touched
+    thing = loaded if isinstance(loaded, Surrogate) and answers else _body(file)
     # NAME.html is the report of `palpate validate`
     path = file.with_name(f"{file.stem}-page.html") if out is None else out
     done = export_html(thing, path, check=not no_check, overwrite=force)
     if done.left_out:
         console.say(f"not in the file: {', '.join(done.left_out)} (5 MB are full, or it is on other nodes)")
     missing = _NOT_INSTALLED.format("wasmtime", "check")
+    missing = "the page computes its answers by itself" if answers else missing
     _print(console, done, [done.file], missing, no_check=no_check)

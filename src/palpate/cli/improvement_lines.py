@@ -34,11 +34,13 @@ def improve_file(
     """
     from palpate.study import read_study
     from palpate.study.run import Paths
+    from palpate.study.study_lock import hold_study
 
     with console.patience(f"Reading {file}"):
         record = read_study(file).with_workers(options.workers)
     paths = Paths(file.parent, record.name)
-    outcome, content, failure = improve_and_print(record, paths, options, console, cluster=scheduler)
+    with hold_study(paths, "palpate sweep"):
+        outcome, content, failure = improve_and_print(record, paths, options, console, cluster=scheduler)
     lines = [] if failure is not None else [content["reason"]]  # which the error says too
     lines.append(
         f"solves  {paths.data} ({len(outcome.train)} to learn from), {paths.random} ({len(outcome.test)} unseen)"

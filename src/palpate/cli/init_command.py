@@ -111,7 +111,8 @@ def _init_preset(path: Path, preset: str, choices: PartOptions, *, force: bool, 
         return
     _require_free(path, force=force)
     write_file(path, text)
-    typer.echo(plain_text(f"{path}: a study called {study.name}. Next: palpate sweep {path}"))
+    why = "" if study.name == path.stem else ", as the one that it starts from; `name` in the file says so"
+    typer.echo(plain_text(f"{path}: a study called {study.name}{why}. Next: palpate sweep {path}"))
 
 
 def _one_file_too_many(path: Path, other: str) -> UsageError:

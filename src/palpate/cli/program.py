@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import typer
 
 from palpate.checks import did_you_mean
-from palpate.cli.app import app
+from palpate.cli.app import STUDY, app
 from palpate.cli.console import Console, advice_in_words
 from palpate.errors import AccuracyError, PalpateError
 from palpate.files import explain_system_error
@@ -20,6 +21,7 @@ __all__ = ["KEPT", "kept_after", "main", "near_file"]
 INTERRUPTED = 128 + signal.SIGINT  # the shell's code of a program that Ctrl-C has ended
 TERMINATED = 128 + signal.SIGTERM  # and of one that was asked to end
 
+_OFFERED = 3  # studies of a folder that are offered, at most
 _ALIKE = 0.75  # how alike the name of a file must be to be offered in place of one that is not there
 
 _GOES_ON = "What is solved is kept: the same command goes on."
@@ -68,7 +70,13 @@ def kept_after(words: list[str]) -> str:
 
 
 def near_file(words: list[str], what: str) -> str:
-    """Return a question that offers the file whose name is near, where an error is of a file that is not there."""
+    """Return a question that offers the file whose name is near, where an error is of a file that is not there.
+
+    Where it is the study that a command takes by default, the studies of this folder are offered.
+    """
+    if what.startswith(f"{STUDY} ") and not STUDY.exists() and str(STUDY) not in words:
+        studies = [str(file) for file in sorted(Path().glob("*.toml")) if _is_study(file)]
+        return f"Did you mean {' or '.join(studies[:_OFFERED])}?" if studies else ""
     missing = [
         Path(word)
         for word in words
@@ -79,6 +87,14 @@ def near_file(words: list[str], what: str) -> str:
     path = missing[0]
     beside = [file.name for file in path.parent.iterdir()]
     return did_you_mean(path.name, beside, shown=lambda name: str(path.with_name(name)), cutoff=_ALIKE)
+
+
+def _is_study(file: Path) -> bool:
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return False
+    return re.search(r"^\[(body|interaction)\]", text, re.MULTILINE) is not None
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -57,6 +57,7 @@ def sweep_file(
     from palpate.dataset import Dataset
     from palpate.study import read_study
     from palpate.study.run import Paths, sweep_study
+    from palpate.study.study_lock import hold_study
     from palpate.sweeps import Scheduler
 
     with console.patience(f"Reading {study}"):
@@ -74,14 +75,15 @@ def sweep_file(
         )
     if scheduler is not None and scheduler.warning:
         console.say(f"Warning: {scheduler.warning}")
-    data, further = sweep_study(
-        record,
-        paths,
-        cluster=scheduler,
-        progress=not console.as_json,
-        case_limit=case_limit,
-        log=lambda stage: console.say(f"Solving: {stage} …"),
-    )
+    with hold_study(paths, "palpate sweep"):
+        data, further = sweep_study(
+            record,
+            paths,
+            cluster=scheduler,
+            progress=not console.as_json,
+            case_limit=case_limit,
+            log=lambda stage: console.say(f"Solving: {stage} …"),
+        )
     target, other = (
         (paths.data, paths.random) if record.memory is None else (paths.histories, paths.unseen_histories)
     )
@@ -137,30 +139,34 @@ def learn_file(study: Path, console: Console, *, watch: bool = False, leave_out:
     in `leave_out` are not learnt from.
     """
     from palpate.cli.growth_view import watch_growth
+    from palpate.cli.learning_steps import LearningSteps
     from palpate.study import read_study
     from palpate.study.mesh_check import load_finer
     from palpate.study.run import Paths, learn_study, load_data, save_model, validate_study, with_validation
     from palpate.study.study_advice import earlier_curve
+    from palpate.study.study_lock import hold_study
 
     with console.patience(f"Reading {study}"):
         record = read_study(study)
     paths = Paths(study.parent, record.name)
-    train, test = load_data(record, paths)
-    console.say(f"Learning from {len(train)} {'solves' if record.memory is None else 'histories'} …")
     page = paths.folder / f"{record.name}.growth.html" if watch else None
-    with watch_growth(page, record.name, console) as recorder:
-        model, history = learn_study(
-            record,
-            train,
-            test,
-            log=lambda stage: console.say(f"{stage} …"),
-            watch=recorder,
-            leave_out=leave_out,
-        )
-    validation = validate_study(record, model, test, history, load_finer(record, paths))
-    curve = earlier_curve(paths, record.name)
-    model = with_validation(model, validation, curve, len(train) if record.memory is None else 0)
-    save_model(paths, model, history)
+    with hold_study(paths, "palpate learn"):
+        train, test = load_data(record, paths)
+        console.say(f"Learning from {len(train)} {'solves' if record.memory is None else 'histories'} …")
+        with watch_growth(page, record.name, console) as recorder, console.patience("Learning"):
+            model, history = learn_study(
+                record,
+                train,
+                test,
+                log=lambda stage: console.say(f"{stage} …"),
+                watch=recorder,
+                leave_out=leave_out,
+                on_step=LearningSteps(console).begin,
+            )
+        validation = validate_study(record, model, test, history, load_finer(record, paths))
+        curve = earlier_curve(paths, record.name)
+        model = with_validation(model, validation, curve, len(train) if record.memory is None else 0)
+        save_model(paths, model, history)
     lines = [f"  {check}" for check in validation.checks if check.criterion.key in _HEADLINES]
     values = {check.criterion.key: check.measured for check in validation.checks}
     console.result(
@@ -238,6 +244,7 @@ def learn_dataset_file(path: Path, effort: float, console: Console, leave_out: S
     The effort multiplies the counts of candidates and iterations of the searches. The rows numbered in `leave_out` are
     not learnt from.
     """
+    from palpate.cli.learning_steps import LearningSteps
     from palpate.dataset import Dataset
     from palpate.learning import learn_dataset
 
@@ -249,6 +256,7 @@ def learn_dataset_file(path: Path, effort: float, console: Console, leave_out: S
         effort=effort,
         leave_out=leave_out,
         log=lambda stage: console.say(f"{stage} …"),
+        on_step=LearningSteps(console).begin,
     )
     target = path.with_suffix(".palpate")
     model.save(target)

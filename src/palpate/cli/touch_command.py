@@ -56,52 +56,78 @@ def touch(
     """Open a part on a page, to be touched while solves and learning improve it. Called again, it goes on."""
     from palpate.cli.console import Console
     from palpate.devices import device_traits
-    from palpate.study.part_study import AUTO, study_file
+    from palpate.study.part_study import study_file
     from palpate.study.run import Paths
+    from palpate.study.study_lock import hold_study
 
     console = Console(as_json, verbose)
-    limit = 60 * minutes
     device_traits(device)  # a name that is none is refused before anything is read
-    if sys.stdout.isatty() and not as_json if view is None else view:
-        from palpate.cli.touch_page import TouchedPart, touch_on_page
-
-        if not part.is_file():
-            raise UsageError(f"There is no file {part}.", fix=f"Name {PART_FORMATS}.")
-        notes: list[str] = []
-        touched = TouchedPart(until, limit, workers, console, refine=choices.element == AUTO)
-        with _no_study_of_refusals(part, choices.name):
-            touch_on_page(
-                part.stem,
-                lambda unit, wrap: _study_on_page(
-                    part,
-                    replace(choices, unit=unit or choices.unit, wrap=choices.wrap if wrap is None else wrap),
-                    notes,
-                    console,
-                ),
-                lambda study: _write(part, study, notes),
-                touched,
-                at_once=start or study_file(part, choices.name).exists(),
-                port=port,
-                device=device,
-                recordings=part.parent,
-            )
-            if touched.exit_code == UsageError.exit_code:
-                raise UsageError(
-                    "The study was refused.", fix="Give the command again, and choose otherwise."
-                )
-        return
-    if device != "page":
+    is_shown = sys.stdout.isatty() and not as_json if view is None else view
+    if device != "page" and not is_shown:
         raise UsageError(
             f"--device {device} presses on the page, and there is none.",
             why="There is no terminal, or --no-view or --json is given.",
             fix="Add --view, or leave --device out.",
         )
-    options = ImprovementOptions(until=until, limit=limit, workers=workers)
-    with _no_study_of_refusals(part, choices.name):
-        study = _study_of(part, choices, console)
-        if choices.element == AUTO:
-            study = _refined(study, study_file(part, choices.name), workers, console)
-        _carry_on(study.with_workers(workers), Paths(part.parent, study.name), options, console)
+    file = study_file(part, choices.name)
+    if not part.is_file() and (is_shown or not file.exists()):
+        raise UsageError(f"There is no file {part}.", fix=f"Name {PART_FORMATS}.")
+    options = ImprovementOptions(until=until, limit=60 * minutes, workers=workers)
+    with (
+        hold_study(Paths(file.parent, file.stem), "palpate touch") as lock,
+        _no_study_of_refusals(part, choices.name),
+    ):
+        if is_shown:
+            page = {
+                "at_once": start or file.exists(),
+                "port": port,
+                "device": device,
+                "on_address": lock.set_address,
+            }
+            _touch_on_page(part, choices, options, console, page)
+        else:
+            _touch_without_page(part, choices, options, console)
+
+
+def _touch_on_page(
+    part: Path, choices: PartOptions, options: ImprovementOptions, console: Console, page: dict[str, Any]
+) -> None:
+    """Let a part be set up and touched on its page; `page` are options of `touch_on_page`."""
+    from palpate.cli.touch_page import TouchedPart, touch_on_page
+    from palpate.study.part_study import AUTO
+
+    notes: list[str] = []
+    touched = TouchedPart(
+        options.until, options.limit, options.workers, console, refine=choices.element == AUTO
+    )
+    touch_on_page(
+        part.stem,
+        lambda unit, wrap: _study_on_page(
+            part,
+            replace(choices, unit=unit or choices.unit, wrap=choices.wrap if wrap is None else wrap),
+            notes,
+            console,
+        ),
+        lambda study: _write(part, study, notes),
+        touched,
+        recordings=part.parent,
+        **page,
+    )
+    if touched.exit_code == UsageError.exit_code and touched.refusal is not None:
+        raise touched.refusal
+
+
+def _touch_without_page(
+    part: Path, choices: PartOptions, options: ImprovementOptions, console: Console
+) -> None:
+    """Improve the study of a part, and print each surrogate."""
+    from palpate.study.part_study import AUTO, study_file
+    from palpate.study.run import Paths
+
+    study = _study_of(part, choices, console)
+    if choices.element == AUTO:
+        study = _refined(study, study_file(part, choices.name), options.workers, console)
+    _carry_on(study.with_workers(options.workers), Paths(part.parent, study.name), options, console)
 
 
 @contextlib.contextmanager

@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -21,7 +22,7 @@ from palpate.cli.console import Console
 from palpate.cli.improvement_lines import mesh_in_words, step_line, trial_in_words
 from palpate.cli.work_estimate import WorkEstimate
 from palpate.errors import PalpateError, UsageError
-from palpate.format import duration
+from palpate.format import duration, share
 from palpate.processes import helper_environment, kill_group
 from palpate.runtime.warm_up import WarmUp
 from palpate.study import Study
@@ -95,11 +96,13 @@ class TouchedPart:
         self.until, self.limit, self.workers, self.console = until, limit, workers, console
         self.times: dict[str, float] = {}
         self.exit_code = 0  # of the work, once it has ended: 2 where it refused the study
+        self.refusal: UsageError | None = None  # then with its reason
         self._made = time.monotonic()
         self._progress = Progress("starting", target=until)
         self._estimate = WorkEstimate()
         self._work = _Work()
         self._warm_up = WarmUp("pressed", "loop")  # beside choosing, solving and learning
+        self._recalled = 0  # solves of a surrogate of an earlier run
         self._stopped, self._begun, self._beginning = False, False, threading.Lock()
         self._bodies: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._threads: list[threading.Thread] = []
@@ -154,6 +157,7 @@ class TouchedPart:
             "log": self._log,
             "progress": self._count,
             "step": self._step,
+            "judged": self._recall,
             "body": self._take_body,
             "ended": self._end,
             "failed": self._fail,
@@ -189,13 +193,19 @@ class TouchedPart:
         self._estimate.end_round()
         self._bodies.put(path)
 
+    def _recall(self, figures: dict[str, Any]) -> None:
+        """Show the error of a surrogate of an earlier run, until it is judged anew."""
+        self._recalled = figures["solves"]
+        self._show(solves=figures["solves"], error_median=figures["median"], error_p95=figures["error"])
+
     def _step(self, figures: dict[str, Any]) -> None:
         step = SimpleNamespace(**figures)
         if step.phase == "solved":
             self._estimate.learn()
         elif step.phase == "learnt" and not step.is_new:
             self._estimate.end_round()  # a new one comes as a body
-        if step.phase in {"learnt", "judged"}:
+        is_known = math.isnan(step.error) and step.solves == self._recalled  # of an earlier run
+        if step.phase in {"learnt", "judged"} and not is_known:
             self.console.say(step_line(step))
         places = np.array(step.places, dtype=float).reshape(-1, 3)
         known: dict[str, Any] = {
@@ -206,6 +216,13 @@ class TouchedPart:
             **{name: figures[name] for name in ("painted_area", "trained_area") if name in figures},
         }
         words = "; ".join(filter(None, (trial_in_words(step), mesh_in_words(step))))
+        earlier = self._progress.error_p95
+        if is_known:
+            del known["error_median"], known["error_p95"]
+        elif math.isnan(step.error) and not math.isnan(earlier):
+            words = f"{share(earlier)} before; the new one is being checked"
+        elif math.isnan(earlier):
+            self._progress = replace(self._progress, trial="")  # it told of the error of the one before
         self._show(**known, trial=words or self._progress.trial)
 
     def _end(self, outcome: dict[str, Any]) -> None:
@@ -220,6 +237,7 @@ class TouchedPart:
         self.console.say(reached)
 
     def _fail(self, error: dict[str, str]) -> None:
+        self.refusal = UsageError(error["what"], why=error["why"], fix=error["fix"])
         words = " ".join(filter(None, (error["what"], error["why"], error["fix"])))
         self.page.end(words)
         self.console.say(words)
@@ -254,6 +272,7 @@ def touch_on_page(
     *,
     at_once: bool = False,
     on_ready: Callable[[PartPage], object] | None = None,
+    on_address: Callable[[str], object] = lambda _: None,
     **options: Any,
 ) -> None:
     """Open the page of a part, let a person choose, and work until Ctrl-C.
@@ -262,7 +281,8 @@ def touch_on_page(
     of the part, its file, and whether that was there before: then the work goes on at once, as with `at_once`, which
     begins with the first choices. A part that is refused and may be wrapped is so by a click, unless `at_once`.
     `write` writes a chosen study and returns its file. `on_ready` is called once with the running page; by default its
-    address is printed, and opened in the user's browser where there is a terminal. The options are those of `PartPage`.
+    address is printed, and opened in the user's browser where there is a terminal. `on_address` gets that address. The
+    options are those of `PartPage`.
     """
     from palpate.study.part_choices import chosen_study, shown_part
 
@@ -296,6 +316,7 @@ def touch_on_page(
 
     def ready(page: PartPage) -> None:
         touched.mark("page")
+        on_address(page.url)
         if on_ready is not None:
             on_ready(page)
         else:

@@ -75,4 +75,5 @@ class WorkEstimate:
         if self._learns:
             self._learning = now - self._learns_since
         self._rounds, self._began, self._batch, self._learns = self._rounds + 1, now, now, False
+        self._words = "choosing the next solves"
         self._done, self._total = 0, 0

@@ -15,6 +15,7 @@ check_fmu       an FMU that answers through FMPy
 core            the C sources; templates: texts of exported files
 umbridge_server a learnt file as a model of UM-Bridge, on this machine
 gltf            a deforming surface as glTF with morph targets
+answer_shapes   shapes of a surrogate without touch, coloured by a field
 shape_files     shapes of datasets and of learnt bodies, as VTU series and glTF
 """
 

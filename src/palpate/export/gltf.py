@@ -11,7 +11,7 @@ import json
 import os
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,7 @@ class ShapeSeries:
     values: np.ndarray  # (k,), time in s, or load, of each state, ascending
     name: str = "body"
     fields: dict[str, np.ndarray] = field(default_factory=dict)  # further fields (k, P), for VTU
+    colours: np.ndarray | None = None  # (k, P, 3), of the nodes in each state, linear; none for one colour
 
     def __post_init__(self) -> None:
         points, states = np.asarray(self.points, dtype=float), np.asarray(self.displacement, dtype=float)
@@ -73,9 +74,17 @@ class ShapeSeries:
             np.linspace(0, len(self.values) - 1, min(most, len(self.values))).round().astype(int)
         )
         fields = {name: values[kept] for name, values in self.fields.items()}
+        colours = None if self.colours is None else self.colours[kept]
         return ShapeSeries(
-            self.points, self.cells, self.displacement[kept], self.values[kept], self.name, fields
+            self.points, self.cells, self.displacement[kept], self.values[kept], self.name, fields, colours
         )
+
+    def from_first(self) -> ShapeSeries:
+        """Return the series that begins at its first state in place of rest; one of a single state stays as it is."""
+        if len(self.values) < 2:
+            return self
+        first = self.displacement[0]
+        return replace(self, points=self.points + first, displacement=self.displacement - first)
 
 
 def write_glb(
@@ -120,6 +129,11 @@ def glb_bytes(
         attributes["NORMAL"] = buffer.add(normals, "VEC3", _VERTICES)
         for shape, move in zip(shapes, moved, strict=True):
             shape["NORMAL"] = buffer.add(_normals(rest + move, series.cells) - normals, "VEC3", _VERTICES)
+    if series.colours is not None:
+        base = series.colours[0]
+        attributes["COLOR_0"] = buffer.add(base, "VEC3", _VERTICES)
+        for shape, colours in zip(shapes, series.colours, strict=True):
+            shape["COLOR_0"] = buffer.add(colours - base, "VEC3", _VERTICES)
     primitive = {
         "attributes": attributes,
         "indices": buffer.add(series.cells.ravel(), "SCALAR", _INDICES),
@@ -152,7 +166,8 @@ def _scene(series: ShapeSeries, primitive: dict[str, Any], sampler: dict[str, An
         "weights": [0.0] * len(series.values),
         "extras": {"targetNames": [f"{value:.6g}" for value in series.values]},
     }
-    look = {"baseColorFactor": _COLOUR, "metallicFactor": 0.0, "roughnessFactor": 0.7}
+    colour = _COLOUR if series.colours is None else (1.0, 1.0, 1.0, 1.0)
+    look = {"baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 0.7}
     channel = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
     return {
         "asset": {"version": "2.0", "generator": "palpate"},

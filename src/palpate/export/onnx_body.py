@@ -20,7 +20,8 @@ from palpate.errors import UsageError
 from palpate.export.onnx_graph import Graph, Value
 from palpate.export.onnx_network import Slopes, network_slopes, regressors
 from palpate.export.onnx_surface import Distance, distance_to
-from palpate.surrogates.baselines import ConstantBaseline, ContactBaseline, PadBaseline
+from palpate.surrogates.baselines import ConstantBaseline, ContactBaseline, OverlapBaseline, PadBaseline
+from palpate.surrogates.baselines.overlap_baseline import LARGEST, SMALLEST
 from palpate.surrogates.energy import LearntEnergy
 
 __all__ = ["BODY_OUTPUTS", "BaselineForm", "Touch", "add_body", "onnx_form"]
@@ -159,8 +160,29 @@ def _constant(baseline: ConstantBaseline, graph: Graph, place: Value, touch: Any
 @onnx_form.register
 def _contact(baseline: ContactBaseline, graph: Graph, place: Value, touch: Touch, xi: Value) -> BaselineForm:
     """Return the contact law at the depth s; see `palpate.surrogates.contact_law`."""
+    return _law(baseline, graph, graph.where(touch.contact, touch.depth, 1.0), touch.normal, touch.bend)
+
+
+@onnx_form.register
+def _overlap(baseline: OverlapBaseline, graph: Graph, place: Value, touch: Touch, xi: Value) -> BaselineForm:
+    """Return the contact law at the equivalent depth of the overlap."""
+    e, slope, bend = distance_to(graph, baseline.pressed)(place)
+    measured = baseline.radius - e
+    depth = measured
+    ends = (SMALLEST, measured < touch.depth * SMALLEST), (LARGEST, measured > touch.depth * LARGEST)
+    for factor, off in ends:
+        depth, slope = (
+            graph.where(off, touch.depth * factor, depth),
+            graph.where(off, touch.normal * factor, slope),
+        )
+        bend = graph.where(off.spread(2), touch.bend * factor, bend)
+    return _law(baseline, graph, graph.where(touch.contact, depth, 1.0), slope, bend)
+
+
+def _law(baseline: ContactBaseline, graph: Graph, s: Value, normal: Value, bend: Value) -> BaselineForm:
+    """Return the contact law at a depth s of slope −`normal` and Hessian −`bend`."""
     twice, factor, length = baseline.law.numbers()
-    p, s = 0.5 * twice, graph.where(touch.contact, touch.depth, 1.0)
+    p = 0.5 * twice
     g: Any = factor
     g = graph.sqrt(s) * g if twice == 5.0 else s * g if twice == 6.0 else s * 0.0 + g
     ratio: Any = 0.0
@@ -168,10 +190,9 @@ def _contact(baseline: ContactBaseline, graph: Graph, place: Value, touch: Touch
         ratio = s / (length + s)
         g = g / graph.sqrt(1.0 + s / length)
     value, slope = g * s * s, g * s * (p - 0.5 * ratio)
-    bend = g * (p * (p - 1.0) - p * ratio + 0.75 * ratio * ratio)
-    outer = _outer(touch.normal, touch.normal)
-    hessian = bend.spread(2) * outer - slope.spread(2) * touch.bend
-    gradient, root = -slope * touch.normal, graph.sqrt(2.0 * value)
+    second = g * (p * (p - 1.0) - p * ratio + 0.75 * ratio * ratio)
+    hessian = second.spread(2) * _outer(normal, normal) - slope.spread(2) * bend
+    gradient, root = -slope * normal, graph.sqrt(2.0 * value)
     return BaselineForm(value, gradient, hessian, root, gradient / root)
 
 

@@ -166,8 +166,8 @@ class WeightsBlock:
         sources = {identifier(baseline.name): source}
         tables = _energy_tables(energy, deviation=deviation)
         arrays = [Table.of(a) for a in _flat(baseline.compiled().args)]
-        if baseline.surface is not None:
-            arrays = _with_tiles(arrays, baseline.surface)
+        for surface in baseline.surfaces:
+            arrays = _with_tiles(arrays, surface)
         tables |= _numbered(BASELINE, arrays, f"baseline {baseline.name!r}")
         code, size = 0, 0
         if memory is not None:
@@ -259,7 +259,7 @@ def identifier(name: str) -> str:
     return f"_{word}" if word[:1].isdigit() else word
 
 
-_BASELINES = ("contact", "pad", "constant")
+_BASELINES = ("contact", "pad", "constant", "overlap")
 _MEMORIES = ("relaxation", "indentation", "iwan-elements")
 
 

@@ -245,7 +245,7 @@ class _Improvement:
 
     def run(self, known: tuple[Surrogate, Any] | None) -> Iterator[ImprovementStep]:
         if len(self.kept) < FIRST:
-            self.log(f"{FIRST} solves to begin with")
+            self.log(f"the first {FIRST} solves")
             points = self.problem.design(FIRST, self.options.seed, depths=1)
             self.kept.add([point[None] for point in points[len(self.kept) :]])
             yield self._step("solved")

@@ -119,6 +119,7 @@ def learn(
     shape: bool = True,
     leave_out: Sequence[int] = (),
     log: Log = lambda _: None,
+    on_step: Log = lambda _: None,
     options: SearchOptions,
     **further: Any,
 ) -> tuple[Surrogate, LearningHistory]:
@@ -143,6 +144,8 @@ def learn(
         neighbours, for example.
     log : callable
         Told what begins, as one line.
+    on_step : callable
+        Told each step of the search for the energy that begins, in words.
     **further
         Options of `palpate.learning.energy.learn_energy`, such as ``units_max``, ``target`` and ``networks``. Of a
         pressed body also ``law``, a contact law that is taken as it is, ``length``, a guess of the depth at which pad
@@ -178,11 +181,13 @@ def learn(
     numbers, excluded = _kept_rows(train, leave_out)
     train, solves = train.take(numbers), len(numbers)
     origin = {"hash": train.ok.hash, "provenance": train.provenance}
+    if "input_node" in train:  # a body that loads bend
+        log(f"displacements of {count(solves, 'solve')}")
     known = recognise(train, Request(options, layout, further))
     if known is None:
         _refuse_options(further)
         return _learn_answers(train, name, options, log)
-    log(f"energy of {count(solves, 'solve')}")
+    log(f"learning the energy of {count(solves, 'solve')}")
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
 
     def limit(share: float) -> float | None:
@@ -191,13 +196,14 @@ def learn(
 
     first = limit(1.0 / (1.0 + _FIELD_SHARE * len(fields)))
     searches = vars(options) | {"seconds": first} | dict(known.options)
-    energy, found = learn_energy(known.solves, known.baseline, **searches)
+    asked: dict[str, Any] = {"rivals": known.rivals, "on_step": on_step}
+    energy, found = learn_energy(known.solves, known.baseline, **asked, **searches)
     painted = None if known.region is None else known.region(energy)
     energy = energy if painted is None else replace(energy, region=painted.region)
     learnt: dict[str, LearntField] = {}
     for i, shown in enumerate(fields):
         assert known.learn_field is not None
-        log("shape" if shown == "displacement" else "stress")
+        log("learning the shape" if shown == "displacement" else "learning the stress")
         searches = vars(options) | {"seconds": limit(1.0 / (len(fields) - i))}
         learnt[shown] = known.learn_field(FieldOptions(name=shown, unit=_SHOWN[shown][1], **searches))
     # a region by the paint does not remember where it was solved; a validation asks for it

@@ -83,7 +83,9 @@ class Pool:
                 initializer=_begin,
                 initargs=(os.getpid(),),
             )
-            return list(executor.map(work, items))
+            # no `executor.map`: interrupted, it cancels what waits, and the thread that then ends loky's processes
+            # fails at work that is cancelled already, with a traceback
+            return [future.result() for future in [executor.submit(work, item) for item in items]]
         except BrokenProcessPool as error:
             raise ResourceError(
                 f"One of the {self._workers} processes that learn was ended before it had answered.",

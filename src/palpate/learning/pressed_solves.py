@@ -21,12 +21,12 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
 from palpate.learning.fields import LearntField, Snapshots, learn_snapshots, lumped_mass
-from palpate.learning.kept_surface import touched_surface
+from palpate.learning.kept_surface import touched_overlap, touched_surface
 from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_region
 from palpate.learning.recognised import Recognised, Request, recogniser
 from palpate.options import FieldOptions
-from palpate.surrogates import ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
-from palpate.surrogates.baselines import depth_series
+from palpate.surrogates import Baseline, ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
+from palpate.surrogates.baselines import OverlapBaseline, depth_series
 from palpate.units import Range
 
 __all__ = ["FEWEST", "PressedSolves", "is_pressed", "recognise_pressed"]
@@ -38,6 +38,8 @@ RADIUS = "probe.radius"  # what a family calls it
 DISSIPATING = ("Plastic",)
 # of the radius: how the touched surface rolls off where it ends, as smooth in the middle as at its border
 SHOULDER = 1 / 3
+# of the overlap: from Hertz's rule on smooth curved surfaces to all of it
+WEIGHTS = (0.5, 0.75, 1.0)
 # shapes to learn a field from. A dome has 16 images of each solve: of 80, 400 shapes leave the largest error of unseen
 # ones at 0.35 mm, 800 at 0.20 and all at 0.17, learnt in 1, 1½ and 3 minutes
 MOST = 800
@@ -83,7 +85,9 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
         baseline = replace(baseline, law=ContactLaw("series", length))
     region = partial(pressed.painted_region, deviation=own.get("deviation"))
     deepest = {"deepest": pressed.deepest or None}
-    return Recognised(baseline, pressed.solves, deepest | options, learn_field, region=region)
+    # a law that was asked for is taken as it is
+    rivals = None if options.get("choose") is False else pressed.overlap_baselines
+    return Recognised(baseline, pressed.solves, deepest | options, learn_field, rivals=rivals, region=region)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +107,7 @@ class PressedSolves:
     # depth at which a contact is as wide as an element, m; None for elements of the usual size
     resolved: float | None
     deepest: float  # depth that the solves were made to, m; 0 where the provenance does not tell
+    skin: tuple[np.ndarray, np.ndarray]  # points (P, 3) in m and triangles (t, 3) of which `surface` is made
     # corners (t, 3, 3) of the triangles of the surface that was to be pressed all over, and of all others, m; None
     # where the presses keep a margin
     painted: tuple[np.ndarray, np.ndarray] | None = None
@@ -155,6 +160,7 @@ class PressedSolves:
             about,
             None if element is None else float(element) ** 2 / (2 * radius),
             _deepest(probe),
+            (rest, triangles[met]),
             None if rim is None else (rest[triangles[touched]], rest[triangles[~touched]]),
             drawn,
         )
@@ -164,6 +170,16 @@ class PressedSolves:
         """The contact baseline to begin with: pad on body, crossing at a tenth of the radius."""
         law = ContactLaw("series", self.radius / 10.0)
         return ContactBaseline(law, self.surface, self.radius, self.radius_input, self.resolved)
+
+    def overlap_baselines(self) -> list[Baseline]:
+        """Return the baselines by the ball's overlap; none over a flat surface, or where the radius is an input."""
+        if self.radius_input is not None:
+            return []
+        overlap, own = touched_overlap(self.data, self.surface, *self.skin), self.baseline
+        if overlap is None:
+            return []
+        parts = own.law, own.touched, own.probe_radius, None, own.resolved
+        return [OverlapBaseline(*parts, overlap.field(weight), weight) for weight in WEIGHTS]
 
     @property
     def solves(self) -> Solves:

@@ -7,7 +7,7 @@ palpate are entered by `recogniser` where they stand: `bent_body`, `pressed_solv
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -49,6 +49,8 @@ class Recognised:
     fields: Mapping[str, NodeField] = field(default_factory=dict)  # that are learnt already
     meta: Mapping[str, Any] = field(default_factory=dict)
     filter: History | None = None
+    # gives other forms of the baseline
+    rivals: Callable[[], Sequence[Baseline]] | None = None
     # the trained region in place of that around the solves, of an energy that was learnt
     region: Callable[[LearntEnergy], PaintedRegion | None] | None = None
     rows: np.ndarray | None = (

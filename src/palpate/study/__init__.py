@@ -8,6 +8,7 @@ quantities           frozen tables with quantities that may carry units
 toml                 the record as a TOML file with comments, and back
 named_studies        studies that have a name
 part_study           study of a part that the user has
+study_lock           one command at a time for the files of a study
 run                  the stages: sweep, load the data, learn, validate, report
 improve_study        a study whose solves are chosen batch by batch, until a force error is reached
 part_work            the work behind the page of `palpate touch`, in a process of its own

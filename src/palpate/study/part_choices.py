@@ -10,8 +10,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from palpate.errors import UsageError
-from palpate.format import millimetres
-from palpate.physics import ImportedMesh, named_material
+from palpate.physics import named_material
 from palpate.physics.materials.library import MATERIALS, material_kind, material_words
 from palpate.physics.shapes.body_file import UNITS, apply_patches
 from palpate.physics.shapes.mesh import BodyMesh
@@ -23,7 +22,7 @@ from palpate.study.interaction_records import ProbeRecord
 from palpate.study.material_records import SolidMaterialRecord
 from palpate.study.part_records import PartRecord
 from palpate.study.part_rim import with_rim
-from palpate.study.part_study import COARSE, HELD, TOUCHED
+from palpate.study.part_study import COARSE, HELD, TOUCHED, require_suitable_ball
 from palpate.study.study import Study
 
 if TYPE_CHECKING:
@@ -80,7 +79,8 @@ def chosen_study(study: Study, choices: PartChoices) -> Study:
     skin = body.bare().skin
     held, touched, surfaces, fixed, touches = _picked(body, acting, skin, choices)
     _require_surfaces(held, touched)
-    _require_room(body, skin, touched, choices)
+    chosen = {"radius": choices.radius, "depth": choices.depth}
+    require_suitable_ball(body, skin.points[skin.triangles[touched]], chosen)
     least = float(f"{acting.depth[0] * choices.depth / acting.depth[1]:.6g}")
     content = study.model_dump()
     content["body"] |= {
@@ -188,24 +188,6 @@ def _require_surfaces(held: np.ndarray, touched: np.ndarray) -> None:
         )
     if not touched.any():
         raise UsageError("Nothing is touched.", fix="Pick the faces that the ball shall press as touched.")
-
-
-def _require_room(body: PartRecord, skin: BodyMesh, touched: np.ndarray, choices: PartChoices) -> None:
-    """Refuse a ball or a depth that the part leaves no room for, and elements that are larger than the ball."""
-    from palpate.viewer.shown_part import require_room
-
-    low, high = skin.corners
-    require_room("radius", choices.radius, high - low)
-    require_room("depth", choices.depth, high - low)
-    if isinstance(body.bare(), ImportedMesh):
-        corners = skin.points[skin.triangles[touched]]
-        size = float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
-        if size > 2 * choices.radius:
-            raise UsageError(
-                f"The elements of the mesh, {millimetres(size)}, are larger than the ball, "
-                f"{millimetres(2 * choices.radius)}.",
-                fix="Choose a larger ball, or a finer mesh.",
-            )
 
 
 def _material(body: PartRecord, choices: PartChoices) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from palpate.errors import PalpateError, UsageError
 from palpate.file_kinds import PART_FORMATS, part_ending, part_kind, way_for
+from palpate.format import millimetres
 from palpate.options import PartOptions, takes
 from palpate.physics.shapes.cad_file import states_unit
 from palpate.physics.shapes.mesh import BodyMesh, Face
@@ -25,7 +26,7 @@ from palpate.study.study import Study
 from palpate.study.toml import to_toml
 from palpate.units import parse_quantity
 
-__all__ = ["AUTO", "part_study", "part_text", "study_file", "study_name"]
+__all__ = ["AUTO", "part_study", "part_text", "require_suitable_ball", "study_file", "study_name"]
 
 HELD, TOUCHED = "held", "touched"
 AUTO = "auto"  # size of elements that finer solves decide
@@ -45,6 +46,7 @@ CELLS = 300  # squares of an element's length on the footprint: about 15,000 unk
 PLACES = 64  # at which the thickness beneath is measured
 NEAR = 1e-6  # of a triangle's size: nearer, a way meets the triangle that it begins at
 COARSE = 0.5  # element over the radius: coarser ones do not feel the ball
+COARSEST = 2.0  # element over the radius, at most, where somebody chooses it
 LEAST_DEPTH = 1 / 25  # least depth over the largest
 MARGIN = 3.0  # distance of places from the rim of the touched surface's box, in radii
 # leading numbers to which a proposal is rounded
@@ -77,9 +79,7 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     if radius is None:
         least = float((high - low).min())
         radius = _nice(min(max(RADIUS * least, math.sqrt(footprint / CELLS) / COARSE), LARGEST * least))
-    element = _nice(min(math.sqrt(footprint / CELLS), COARSE * radius))
-    if options.element not in {None, AUTO}:
-        element = parse_quantity(options.element, "m", "--element", bare=False)
+    element = _element_size(options.element, footprint, radius)
     deepest = _nice(DEPTH * radius) if options.depth is None else options.depth
     fixed, named = _support(faces, float(low[2]), float(high[2] - low[2]))
     if options.held:
@@ -105,12 +105,48 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
         "test": {"samples": 24, "depths": 2},  # many places: several depths of one tell less
     }
     study = _study_of(content) if touched else _with_touched(content, named)
+    assert isinstance(study.body, PartRecord)
+    chosen = {name: length for name in ("radius", "depth") if (length := getattr(options, name)) is not None}
+    require_suitable_ball(study.body, _touched_corners(study.body, touched or TOUCHED), chosen)
     study = _suit(study, content, element)
     if options.depth is None:
         study = _suit_depth(study)
     study = with_rim(study)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
+
+
+def _element_size(wanted: str | None, area: float, radius: float) -> float:
+    """Return the size in m of elements under a ball: the one that is wanted, or by the area in m² of the part's box."""
+    if wanted is None or wanted == AUTO:
+        return _nice(min(math.sqrt(area / CELLS), COARSE * radius))
+    size = parse_quantity(wanted, "m", "--element", bare=False)
+    _require_fine_elements(size, radius, "The elements", "smaller elements")
+    return size
+
+
+def require_suitable_ball(body: PartRecord, touched: np.ndarray, chosen: Mapping[str, float]) -> None:
+    """Refuse a ball or a depth that a part leaves no room for, and elements of its mesh that are larger than the ball.
+
+    `chosen` holds the ``radius`` and the ``depth`` in m that a person chose, on the page or in a command; `touched` are
+    the corners (t, 3, 3) of the touched triangles in m.
+    """
+    from palpate.viewer.shown_part import require_room
+
+    low, high = body.bare().skin.corners
+    for name, length in chosen.items():
+        require_room(name, length, high - low)
+    if "radius" in chosen and part_kind(body.file) == "mesh":
+        size = float(np.median(np.linalg.norm(touched - np.roll(touched, 1, axis=1), axis=2)))
+        _require_fine_elements(size, chosen["radius"], "The elements of the mesh", "a finer mesh")
+
+
+def _require_fine_elements(size: float, radius: float, what: str, instead: str) -> None:
+    if size > COARSEST * radius:
+        raise UsageError(
+            f"{what}, {millimetres(size)}, are larger than the ball, {millimetres(2 * radius)}.",
+            fix=f"Choose a larger ball, or {instead}.",
+        )
 
 
 def _material(options: PartOptions) -> str | dict[str, Any]:
@@ -135,8 +171,8 @@ def _suit(study: Study, content: dict[str, Any], element: float) -> Study:
     surface, as in the hole of a ring, one radius has to do.
     """
     assert isinstance(study.body, PartRecord)
-    skin, acting = study.body.shape().skin, content["interaction"]
-    corners = skin.points[skin.triangles_of(acting["touches"])]
+    acting = content["interaction"]
+    corners = _touched_corners(study.body, acting["touches"])
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     kept = float(np.median(edges)) if part_kind(study.body.file) == "mesh" else 0.0
     changes: dict[str, Any] = {}
@@ -156,6 +192,12 @@ def _suit(study: Study, content: dict[str, Any], element: float) -> Study:
         return study
     body = study.body.model_dump()
     return _study_of(content | changes | {"body": body})
+
+
+def _touched_corners(body: PartRecord, touches: str) -> np.ndarray:
+    """Return the corners (t, 3, 3) in m of the triangles of the touched surface."""
+    skin = body.shape().skin
+    return np.asarray(skin.points[skin.triangles_of(touches)])
 
 
 def _suit_depth(study: Study) -> Study:

@@ -7,12 +7,13 @@ first solves, which the rough surrogate has not learnt from, tell its error unti
 
 Standard input brings one line of JSON with what to do, then perhaps the line ``stop``: no further batch of solves
 begins, and what there is is concluded. Its end ends this process and all that it started. Standard output carries lines
-of JSON, each with one of
+of JSON, each with one or more of
 
     log        a part of the work begins, in words
     progress   solves of this batch that are done, and their number
     step       `palpate.improvement.ImprovementStep`, without what can't be written
     body       file of a surrogate to touch
+    judged     relative force error of a surrogate of an earlier run, as its file states it, and its number of solves
     ended      whether the wanted error was reached, why it ended, report and figures in words
     failed     what, why and fix of an error
 """
@@ -89,7 +90,7 @@ def work_on(
     rough = rough_study(study)
     in_hand: Path | None = None  # a rough surrogate
     if (own := _find_surrogate(study, paths)) is not None:
-        say({"body": str(own)})
+        say({"body": str(own)} | _judgement(own))
     elif rough is not None:
         in_hand = _find_surrogate(rough, Paths(paths.folder, rough.name))
         if in_hand is not None:
@@ -140,6 +141,17 @@ def _find_surrogate(study: Study, paths: Paths) -> Path | None:
         return None
     # compared as the file has it: tuples are lists there
     return paths.model if origin.get("problem") == json.loads(json.dumps(wanted)) else None
+
+
+def _judgement(model: Path) -> dict[str, Any]:
+    """Return the line that says how an earlier run judged a surrogate; empty where its file does not tell."""
+    from palpate.surrogates import Surrogate
+
+    curve = Surrogate.load(model).meta.get("learning_curve") or [{}]
+    solves, median, p95 = (curve[-1].get(name, math.nan) for name in ("solves", "force_median", "force_p95"))
+    if not math.isfinite(p95):
+        return {}
+    return {"judged": {"solves": int(solves), "median": float(median), "error": float(p95)}}
 
 
 def _first_touch(rough: Study, paths: Paths, cluster: Any, say: Say) -> Path | None:

@@ -216,12 +216,13 @@ def learn_study(
     log: Log = lambda _: None,
     watch: Any = None,
     leave_out: Sequence[int] = (),
+    on_step: Log = lambda _: None,
 ) -> tuple[Any, Any]:
     """Learn the study's surrogate, which keeps the study's runtime settings.
 
     Rows of `test` are only watched while a filter learns; `progress` counts its observations, and `watch` (a
     GrowthRecorder) keeps frames of a sequential filter's growth. Rows of `train` numbered in `leave_out` are not learnt
-    from. Returns what `palpate.learn` returns, and for a
+    from. `on_step` is told each step of the search for the energy. Returns what `palpate.learn` returns, and for a
     body with memory how well it fits.
     """
     if watch is not None and (study.filter is None or not isinstance(train, Dataset)):
@@ -232,7 +233,7 @@ def learn_study(
         )
     if isinstance(train, Dataset):
         options = _options(study, train, test, progress, log) | ({} if watch is None else {"watch": watch})
-        model, history = learn_dataset(train, leave_out=leave_out, **options)
+        model, history = learn_dataset(train, leave_out=leave_out, on_step=on_step, **options)
         model = with_relaxation(study, model, log)
     elif leave_out:
         raise UsageError(
@@ -250,7 +251,7 @@ def _options(study: Study, train: Dataset, test: Any, progress: Any, log: Log) -
     if study.filter:
         watched = {"heldout": test, "progress": progress}
         form = {"settings": study.filter.build(len(train.ranges)), "passes": study.filter.passes}
-        return {**options, **form, **watched, "seed": study.filter.seed}
+        return {**options, **form, **watched, "seed": study.filter.seed, "log": log}
     if study.sweep and study.sweep.symmetric:
         # shown on a mesh that is fine wherever the body is touched, not in the part that is solved alone
         options["layout"] = study.problem(whole=True).layout

@@ -201,11 +201,12 @@ class LoadLearningRecord(Record):
     coupling: Stiffness | None = Field(
         None, description="between hand and node; left out: chosen from the data"
     )
+    effort: Number = _key(EnergyOptions, "effort")
 
     def options(self) -> dict[str, Any]:
         """Return the options of `palpate.learn`."""
         refinement = Refinement(self.samples, self.units_max, self.target, self.starts)
-        return {"refinement": refinement, "coupling": self.coupling}
+        return {"refinement": refinement, "coupling": self.coupling, "effort": self.effort}
 
 
 class PadLearningRecord(Record):

@@ -16,6 +16,11 @@ class Paths:
     name: str
 
     @property
+    def lock(self) -> Path:
+        """File that the command which works on the study has locked."""
+        return self.folder / f".{self.name}.palpate-lock"
+
+    @property
     def data(self) -> Path:
         """Dataset of the sweep."""
         return self.folder / f"{self.name}.zarr"

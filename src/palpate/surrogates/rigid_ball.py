@@ -50,6 +50,7 @@ class PadPart:
 
     def __str__(self) -> str:
         return (
+            "The probe is a rigid ball with a soft pad around it. "
             f"At a depth of {length(self.depth)} the pad takes about {share(self.depth_share)} of the depth; "
             f"a rigid ball would feel about {plain(self.rigid_force)} N instead of {plain(self.force)} N."
         )

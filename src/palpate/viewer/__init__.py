@@ -15,6 +15,7 @@
 `shown_body`       that body as plain arrays, of solutions, VTU, PVD or datasets
 `web_server`       a server for this machine alone: its port, its thread, the page's way into the browser
 `guard`            who is let in: Host, Origin and token; `traffic`: fair shares, rates, limits of connections
+`answer_viewer`    `show_answers`: the page of a surrogate without touch; `answer_page`: its parts, and one HTML file
 ``client/``        the page's sources (TypeScript, three.js); ``static/`` is what they build to
 =================  ====================================================================================
 

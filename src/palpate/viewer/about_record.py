@@ -33,8 +33,14 @@ _FIGURES = ("validation", "left_out")
 
 
 def about_record(meta: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a body's record for people; a group of which nothing is left is no group."""
+    """Return a body's record for people; a group of which nothing is left is no group.
+
+    A body that a filter has learnt tells the solves that the filter saw: fewer of them carry its energy.
+    """
     record: dict[str, Any] = {}
+    observed = meta.get("filter")
+    if isinstance(observed, Mapping) and "solves" in meta and "samples" in observed:
+        meta = {**meta, "solves": observed["samples"]}
     for name, value in meta.items():
         if name in INTERNAL:
             continue

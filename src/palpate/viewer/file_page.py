@@ -7,13 +7,10 @@ and what the page is told first.
 
 from __future__ import annotations
 
-import base64
-import gzip
-import html
 import json
+import math
 import os
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,12 +24,13 @@ from palpate.export.field_tables import PROMISE, SURFACE, field_tables
 from palpate.export.wasm_core import WasmCore, wasmtime_module
 from palpate.export.weights_block import FIELD, WeightsBlock
 from palpate.files import write_file
-from palpate.format import script_json
 from palpate.output_files import require_outputs, with_seal
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import FieldSurrogate, NodeField, Surrogate
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.viewer.about_record import about_record
+from palpate.viewer.answer_page import AnswerPage
+from palpate.viewer.file_document import packed, page_document, page_statics, shuffled_words
 from palpate.viewer.file_line import compare_line, line_facts
 from palpate.viewer.messages import Hello, Modes
 from palpate.viewer.packed_surface import PackedSurface, rounded_points
@@ -41,7 +39,6 @@ from palpate.viewer.surface_drawing import SurfaceDrawing
 
 __all__ = ["ExportedPage", "export_html", "html_page"]
 
-STATIC = Path(__file__).parent / "static"
 # modes and moving nodes: the page sums the shape up itself
 DRAWN_BY_THE_PAGE = (FIELD + 4, FIELD + 6, FIELD + 7)
 LARGEST = 5_000_000  # bytes of a file, beyond which no further field is added
@@ -50,10 +47,6 @@ RATE = 60.0  # Hz, rate of the pictures
 _MARGIN = 20_000  # bytes for facts, card and the document around the parts
 MOVED = 0.1  # share of a field's promise, by which rounding a place may move it
 FINEST = 2**-28  # least step of places over the body's size; without a field it is 2**-19
-# how the built modules begin and end
-_IMPORT = re.compile(r'import\{([^{}]*)\}from"\./([^"/]+)";')
-_EXPORT = re.compile(r"export\{([^{}]*)\};?\s*$")
-_ALIAS = re.compile(r"([\w$]+) as ([\w$]+)")
 
 
 class _Settings(NamedTuple):
@@ -74,11 +67,16 @@ def export_html(
 ) -> ExportedPage:
     """Write a learnt body as NAME.html, and compare what it answers with palpate if wasmtime is installed.
 
-    A probe presses the body, a pad holds it, or a hand holds a node of a line. Where the core does not answer as
-    palpate does, nothing is written. `overwrite` replaces files whatever they are; by default those alone that an
-    earlier export wrote.
+    A probe presses the body, a pad holds it, or a hand holds a node of a line; a surrogate that can't be touched has
+    sliders, and its page computes without the core, so that there is nothing to run here. Where the core does not
+    answer as palpate does, nothing is written. `overwrite` replaces files whatever they are; by default those alone
+    that an earlier export wrote.
     """
     require_outputs([path], endings=(".html", ".htm"), overwrite=overwrite)
+    if not surrogate.can_be_touched:
+        answers = AnswerPage.of(surrogate, Path(path).stem.removesuffix("-page"))
+        file = write_file(Path(path), with_seal(path, answers.document()))
+        return ExportedPage(file, answers.hash, None, answers.left_out)
     page = _Page.of(surrogate)
     comparison = page.compare() if check and wasmtime_module() is not None else None
     if comparison is not None:
@@ -90,7 +88,7 @@ def export_html(
 
 def html_page(surrogate: Surrogate) -> str:
     """Return a learnt body as one HTML file; one with a part without C source has none."""
-    return _Page.of(surrogate).text
+    return _Page.of(surrogate).text if surrogate.can_be_touched else AnswerPage.of(surrogate).document()
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +121,8 @@ class _Page:
         model = PageModel(touchable(surrogate))
         traits = device_traits("page")
         place = model.body.workspace(traits.radius)
-        hello = model.hello(_Settings(place.scale, place.radius, traits.max_force), RATE)
+        most = min(traits.max_force, model.body.meta.get("runtime", {}).get("max_force", math.inf))
+        hello = model.hello(_Settings(place.scale, place.radius, most), RATE)
         if model.body.line is not None:
             return cls._of_line(surrogate, model.body.line, hello)
         assert model.surface is not None
@@ -137,12 +136,12 @@ class _Page:
         block = WeightsBlock.of(surrogate, field=keys[names[0]] if names else None)
         bare = _without_modes(block)
         parts = {
-            "surface": _packed(surface.data),
-            "core": _packed(built_core("core.wasm")),
-            "weights-0": _packed(_by_weight(bare.to_bytes())),
+            "surface": packed(surface.data),
+            "core": packed(built_core("core.wasm")),
+            "weights-0": packed(shuffled_words(bare.to_bytes())),
             **own_parts,
         }
-        room = LARGEST - sum(map(len, parts.values())) - sum(len(text) for text in _statics())
+        room = LARGEST - sum(map(len, parts.values())) - sum(len(text) for text in page_statics())
         chosen = [keys[name] for name in names]
         fields = list(_fields_with_room(surrogate, chosen, block, coarse, surface, room))
         kept = {field.shown.name for field in fields}
@@ -165,8 +164,8 @@ class _Page:
             "fields": [field.facts for field in fields],
             "line": None,
         }
-        parts |= {"hello": _packed(hello.to_json().encode()), "facts": _packed(json.dumps(facts).encode())}
-        text = _document(surrogate.name, parts, card.to_json())
+        parts |= {"hello": packed(hello.to_json().encode()), "facts": packed(json.dumps(facts).encode())}
+        text = page_document(surrogate.name, parts, card.to_json())
         return cls(surrogate, bare, tuple(fields), left_out, text)
 
     @classmethod
@@ -184,13 +183,13 @@ class _Page:
         }
         hello = replace(hello, meta=about_record(surrogate.meta) | about_record(_card_in_words(card)))
         parts = {
-            "core": _packed(built_core("core.wasm")),
-            "weights-0": _packed(_by_weight(block.to_bytes())),
-            "line": _packed(_by_weight(nodes.to_bytes())),
-            "hello": _packed(hello.to_json().encode()),
-            "facts": _packed(json.dumps(facts).encode()),
+            "core": packed(built_core("core.wasm")),
+            "weights-0": packed(shuffled_words(block.to_bytes())),
+            "line": packed(shuffled_words(nodes.to_bytes())),
+            "hello": packed(hello.to_json().encode()),
+            "facts": packed(json.dumps(facts).encode()),
         }
-        text = _document(surrogate.name, parts, card.to_json())
+        text = page_document(surrogate.name, parts, card.to_json())
         return cls(surrogate, block, (), (), text, nodes)
 
     def compare(self) -> Comparison:
@@ -280,8 +279,8 @@ def _pack_own_surface(
     surface = PackedSurface.of(drawing.surface, step)
     facts, data = surface.binding(own, carrier, drawing.nodes)
     return {"surface": surface.facts, "binding": facts}, {
-        "drawn": _packed(surface.data),
-        "binding": _packed(data),
+        "drawn": packed(surface.data),
+        "binding": packed(data),
     }
 
 
@@ -293,7 +292,7 @@ def _page_field(shown: Any, block: WeightsBlock, modes: Modes, surface: PackedSu
     points = rounded_points(shown.points, surface.facts["step"])
     rounded = replace(shown, rest=rows[0], modes=rows[1:], points=points)
     bare = _without_modes(block)
-    return _PageField(shown, rounded, bare, facts, _packed(_by_weight(bare.to_bytes())), _packed(data))
+    return _PageField(shown, rounded, bare, facts, packed(shuffled_words(bare.to_bytes())), packed(data))
 
 
 def _without_modes(block: WeightsBlock) -> WeightsBlock:
@@ -302,71 +301,7 @@ def _without_modes(block: WeightsBlock) -> WeightsBlock:
     return replace(block, tables=tables)
 
 
-def _statics() -> tuple[str, str]:
-    """Return style and script of every page."""
-    style = (STATIC / "assets" / "page.css").read_text("utf-8")
-    chunks: dict[str, str] = {}
-    _add_chunk("file.js", chunks)
-    # a page from disk may load no modules: they become functions of one plain script
-    script = "\n".join(["(() => {", '"use strict";', "const chunks = {};", *chunks.values(), "})();"])
-    return style, script.replace("</script", "<\\/script")
-
-
-def _add_chunk(name: str, chunks: dict[str, str]) -> None:
-    """Add a built module as a function of the modules before it, after those that it imports."""
-    text = (STATIC / "assets" / name).read_text("utf-8")
-    imported = [match[2] for match in _IMPORT.finditer(text)]
-    for other in imported:
-        if other not in chunks:
-            _add_chunk(other, chunks)
-    text = _IMPORT.sub(lambda match: f"const{{{match[1].replace(' as ', ':')}}}=chunks['{match[2]}'];", text)
-    text = _EXPORT.sub(lambda match: "return{" + _ALIAS.sub(r"\2:\1", match[1]) + "};", text)
-    chunks[name] = f"chunks['{name}']=(()=>{{{text}}})();"
-
-
-def _document(name: str, parts: Mapping[str, str], card: str) -> str:
-    """Return the page's skeleton with style, script, packed parts and model card put into it."""
-    skeleton = (STATIC / "index.html").read_text("utf-8")
-    body = re.search(r"<body>.*</body>", skeleton, re.DOTALL)
-    assert body is not None
-    style, script = _statics()
-    packed = "\n".join(
-        f'<script type="application/octet-stream" id="palpate-{key}">{part}</script>'
-        for key, part in parts.items()
-    )
-    icon = base64.b64encode((STATIC / "favicon.svg").read_bytes()).decode()
-    licence = (STATIC / "THIRD-PARTY.txt").read_text("utf-8")  # of what the script contains
-    return f"""<!doctype html>
-<!--
-{licence}-->
-<html lang="en" data-mode="touch" data-file>
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1, viewport-fit=cover">
-<meta name="color-scheme" content="light dark">
-<title>{html.escape(name)} · palpate</title>
-<link rel="icon" type="image/svg+xml" href="data:image/svg+xml;base64,{icon}">
-<style>{style}</style>
-</head>
-{body.group(0).replace("</body>", "")}
-{packed}
-<script type="application/json" id="palpate-card">{script_json(card)}</script>
-<script>{script}</script>
-</body>
-</html>
-"""
-
-
 def _card_in_words(card: ModelCard) -> dict[str, Any]:
     """Return what a model card says beside the record of the body's making."""
     words = card.in_words()
     return {name: words[name] for name in words if name not in {"trained on", "errors"}}
-
-
-def _by_weight(data: bytes) -> bytes:
-    """Return the bytes of equal weight of all words of eight bytes one after the other, which packs better."""
-    return np.frombuffer(data, dtype=np.uint8).reshape(-1, 8).T.tobytes()
-
-
-def _packed(data: bytes) -> str:
-    return base64.b64encode(gzip.compress(data, compresslevel=9, mtime=0)).decode("ascii")

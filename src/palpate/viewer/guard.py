@@ -49,6 +49,8 @@ NO_TOKEN = f"""{EMPTY}
 MOST_REQUESTS = 64  # requests answered at a time; a browser has six connections to a server
 REQUESTS, BURST = 100.0, 300.0  # requests per second in the long run, and at once; a page needs about ten
 WARNINGS = 20.0  # lines of the log about refusals at once, and one per second in the long run
+REASONS = 64  # reasons of refusals that are remembered, so that each is written down once
+OLD_PAGE = "a page of an earlier start that is still open in a browser; open the address that is printed here"
 
 
 class Token:
@@ -70,6 +72,11 @@ class Token:
             cookie.strip().partition("=") for line in headers.getlist("cookie") for cookie in line.split(";")
         )
         return any(self.equals(value) for name, _, value in pairs if name == self.name)
+
+    def is_outdated_in_cookies(self, headers: Headers) -> bool:
+        """Tell whether a request that is refused shows a cookie of this name: of an earlier start at this port."""
+        cookies = ";".join(headers.getlist("cookie")).split(";")
+        return any(cookie.partition("=")[0].strip() == self.name for cookie in cookies)
 
     def is_in_query(self, scope: Scope) -> bool:
         """Tell whether the address that is asked for carries the secret."""
@@ -116,6 +123,7 @@ class Guard:
         self._app, self._token = app, token
         self._pace, self._warnings = Bucket(REQUESTS, BURST), Bucket(1.0, WARNINGS)
         self._requests = 0
+        self._reasons: set[str] = set()  # that were written down
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one connection."""
@@ -151,7 +159,7 @@ class Guard:
             return self._token.welcome(scope)
         if self._token.is_in_cookies(headers):
             return None
-        self._warn("a request without the token")
+        self._warn(OLD_PAGE if self._token.is_outdated_in_cookies(headers) else "a request without the token")
         return HTMLResponse(NO_TOKEN, 401, {"connection": "close"})
 
     async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -169,5 +177,9 @@ class Guard:
             self._requests -= 1
 
     def _warn(self, reason: str) -> None:
-        if self._warnings.try_take():  # a flood must not fill the log
-            logger.warning("refused: %s", reason)
+        """Write a reason down once: an old page asks again every few seconds, and a flood must not fill the log."""
+        if reason in self._reasons or not self._warnings.try_take():
+            return
+        if len(self._reasons) < REASONS:
+            self._reasons.add(reason)
+        logger.warning("refused: %s", reason)

@@ -247,7 +247,7 @@ class PartPage(LocalServer):
             body = replace(load_touchable(path), name=self.name)
             model = PageModel(body, self._version + 1, centre)
             if self.loop is None:
-                self._open(model, path)
+                self._open(model, path, body.meta.get("runtime", {}).get("max_force"))
             else:
                 self.loop.swap(path)
                 self._do(self._replace(model))
@@ -258,9 +258,10 @@ class PartPage(LocalServer):
         """Say that no more solves come, and why; what is there can be touched on."""
         self._turn("ended", words)
 
-    def _open(self, model: PageModel, path: str | os.PathLike[str]) -> None:
-        """Start the real-time process, and a session for its pages."""
-        self.loop = self._closing.enter_context(LoopProcess(path, device=self._device))
+    def _open(self, model: PageModel, path: str | os.PathLike[str], limit: float | None) -> None:
+        """Start the real-time process with a force limit in N, the device's by default, and a session for its pages."""
+        loop = LoopProcess(path, device=self._device, max_force=limit)
+        self.loop = self._closing.enter_context(loop)
         hand = hand_kind(self._device)
         self._session = Session(model, self.loop, hand, self._device, recordings=self._recordings)
         self._do(self._watch(self._session))

@@ -67,7 +67,7 @@ NOT_SOFTENED = Feel(0.0, 0.0, 0.0, override=False, words="")
 ENDED = Notice(
     "The real-time process has ended: the force is zero and nothing moves any more.",
     "It was killed or failed; the terminal that serves this page may say more.",
-    "Start palpate again and open the address that it prints; this page then finds the new server by itself.",
+    "Start palpate again, and open the new address that its terminal shows.",
 )
 CROWDED = Notice(
     f"{MOST_PAGES} pages look at this body already.",

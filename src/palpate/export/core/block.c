@@ -144,7 +144,8 @@ PP_PART int pp_baseline_fits(const pp_array *a, const int32_t *head) {
   const pp_array *own = a + PP_BASELINE;
   const int32_t n = head[PP_INPUTS], k = head[PP_FELT];
   int32_t i;
-  if (head[PP_BASELINE_CODE] == 1) {
+  if (head[PP_BASELINE_CODE] == 1 || head[PP_BASELINE_CODE] == 4) {
+    if (head[PP_BASELINE_CODE] == 4 && !pp_surface_fits(own + 4)) return 0;
     if (k != 3 || !pp_dense(&own[0]) || own[0].n[0] != 6 || !pp_surface_fits(own + 1)) return 0;
     return own[0].real[4] >= R(-1) && own[0].real[4] < (pp_real)(n - 3) && own[0].real[5] > R(0);
   }
@@ -200,7 +201,7 @@ PP_PART int pp_open(const unsigned char *bytes, uint64_t size, pp_array *arrays)
   if (!pp_is(&arrays[PP_HEAD], 7, 1, 0)) return PP_MISFIT;
   n = head[PP_INPUTS];
   k = head[PP_FELT];
-  if (head[PP_BASELINE_CODE] < 1 || head[PP_BASELINE_CODE] > 3) return PP_UNKNOWN;
+  if (head[PP_BASELINE_CODE] < 1 || head[PP_BASELINE_CODE] > 4) return PP_UNKNOWN;
   if (head[PP_MEMORY_CODE] < 0 || head[PP_MEMORY_CODE] > 3) return PP_UNKNOWN;
   if (n < 1 || n > PP_MOST || k < 1 || k > 3 || k > n || head[PP_RADIUS_INPUT] >= n) return PP_MISFIT;
   if (!pp_is(&arrays[PP_NUMBERS], 5, 1, 1) || !pp_is(&arrays[PP_LIMITS], 3, n, 1)) return PP_MISFIT;

@@ -11,7 +11,7 @@ static void try_step(Instance *c, const double *kept, double dt) {
  * along the force of the body, which it never turns round: nothing pulls a probe back. */
 static void renew_drag(Instance *c) {
   const double *axes = c->arrays[PP_AXES].real, *f = c->now.force, scale = c->now.scale, d = c->now.damping;
-  const int is_probe = c->arrays[PP_HEAD].whole[PP_BASELINE_CODE] == 1;
+  const int is_probe = pp_is_probe(c->arrays);
   const int32_t felt = is_probe ? 1 : c->arrays[PP_HEAD].whole[PP_FELT];
   const double size = PP_ABS(scale) * PP_SQRT(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
   int32_t a, i;

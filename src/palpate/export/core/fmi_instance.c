@@ -170,7 +170,7 @@ static void go_to_start(Instance *c) {
   c->now.mass = 0.05;
   for (i = 0; i < c->parameters; i++) c->now.p[i] = 0.5 * (low[felt + i] + high[felt + i]);
   for (i = 0; i < 3; i++) {
-    if (c->arrays[PP_HEAD].whole[PP_BASELINE_CODE] == 1) {
+    if (pp_is_probe(c->arrays)) {
       deep[i] = i < 2 ? (low[i] + high[i]) / 2.0 : low[i];
       c->now.x[i] = i < 2 ? deep[i] : high[i];
     } else {

@@ -49,6 +49,11 @@ PP_PART pp_real pp_nan(void) {
   return none / none;
 }
 
+/* whether the body is pressed by a free probe, by the closest point (1) or by its overlap (4) */
+PP_PART int pp_is_probe(const pp_array *a) {
+  return a[PP_HEAD].whole[PP_BASELINE_CODE] == 1 || a[PP_HEAD].whole[PP_BASELINE_CODE] == 4;
+}
+
 PP_PART const pp_array *pp_baseline_array(const pp_model *m, int32_t i) { return &m->a[PP_BASELINE + i]; }
 
 PP_PART const pp_array *pp_memory_array(const pp_model *m, int32_t i) { return &m->a[PP_MEMORY + i]; }

@@ -42,7 +42,7 @@ def corrected_surrogate(
     assert isinstance(baseline, ContactBaseline)
     # ℓ is to be taken where it was: the deepest trained place stays, and is `height` deeper now
     deeper = Continuation(going.widths, going.deepest + height, going.depth_width)
-    higher = baseline.with_surface(raise_surface(baseline.touched, height, _largest(energy)))
+    higher = baseline.raised(height, raise_surface(baseline.touched, height, _largest(energy)))
     return body.with_energy(replace(moved, baseline=higher, continuation=deeper), meta)
 
 

@@ -48,8 +48,7 @@ class Phantom:
         baseline = self.model.baseline
         assert isinstance(baseline, ContactBaseline)
         surface = raise_surface(baseline.touched, self.height, baseline.radius)
-        d, normal, _ = surface.at(np.ascontiguousarray(X[:, :3]))
-        s = baseline.radius - d
+        s, normal, _ = baseline.raised(self.height, surface).law_depth(X)
         U0, first, _ = baseline.law.energy(s)
         value, slope = self._factor(X)
         t = np.tanh((s - self.depth) / self.width)

@@ -76,8 +76,7 @@ class Touches:
         base = scale * both @ np.concatenate([net.tail[0], net.weights[0]])
         base[:, 0] += net.scaling.output_centre[0]
         assert isinstance(baseline, ContactBaseline)
-        _, normal, _ = baseline.touched.at(np.ascontiguousarray(X[:, :3]))
-        depth = baseline.coordinate(X)
+        depth, normal, _ = baseline.law_depth(X)
         W = _whitening(noise, force, energy.stiffness(X), along)
         return cls(
             depth, normal, base, scale * both @ prior.root, force.copy(), W, baseline.law, prior.offset

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import cast
@@ -25,7 +25,7 @@ from palpate.network.radial import RadialFunction
 from palpate.options import EnergyOptions, takes
 from palpate.rbf.regressors import Regressors
 
-__all__ = ["EnergyEnsemble", "best_mean", "score", "search_energy"]
+__all__ = ["STEPS", "EnergyEnsemble", "best_mean", "score", "search_energy"]
 
 _FORMS = ("rotated", "axis-aligned", "rank-2")  # the last for more inputs than the position
 _RADIALS: tuple[RadialFunction, ...] = ("inverse-multiquadric", "matern-5/2", "gaussian")
@@ -52,14 +52,23 @@ class EnergyEnsemble(Ensemble):
     error: float  # geometric mean over solves of what is missed by refining again and by the closed form
 
 
+STEPS = ("kinds of networks", "more units", "random starts", "judging")
+"""The steps of the search, in words."""
+
+
 @takes(EnergyOptions)
 def search_energy(
-    problem: EnergyProblem, *, options: EnergyOptions, budget: Budget | None = None
+    problem: EnergyProblem,
+    *,
+    options: EnergyOptions,
+    budget: Budget | None = None,
+    on_step: Callable[[str], None] = lambda _: None,
 ) -> tuple[EnergyEnsemble, tuple[Trial, ...]]:
-    """Return the mean of the best networks, and the records of all that were tried."""
+    """Return the mean of the best networks, and the records of all that were tried; `on_step` gets each of `STEPS`."""
     budget, pool = budget or Budget(), Pool(options.workers)
     search = Search(problem, budget.part(_SEARCH_SHARE), pool)
-    _search_structure(search, options)
+    _search_structure(search, options, on_step)
+    on_step(STEPS[3])
     order = sorted(search.tried, key=lambda one: one.error)[
         : budget.count(_CROSS_VALIDATED * _worthwhile(problem), 2)
     ]
@@ -102,11 +111,12 @@ def _score_in_time(
     return score(problem, candidate, max(left, 0.1)) if left > 0 or number == 0 else None
 
 
-def _search_structure(search: Search, options: EnergyOptions) -> None:
+def _search_structure(search: Search, options: EnergyOptions, on_step: Callable[[str], None]) -> None:
     """Try every kind of unit at one size, grow the best, and try random starts about the best size."""
     problem, budget = search.problem, search.budget
     assert isinstance(problem, EnergyProblem)
     starts = _Starts(problem, options.units_max, options.seed)
+    on_step(STEPS[0])
     kinds = [problem.regressors(*kind) for kind in _kinds(options, problem.X.shape[1])]
     best_of_kinds = search.try_all(
         (starts.random(kind, _KIND_UNITS, "kind") for kind in kinds for _ in range(_KIND_STARTS)),
@@ -114,6 +124,7 @@ def _search_structure(search: Search, options: EnergyOptions) -> None:
     )
     best_of_kinds.sort(key=lambda one: one.error)
     best_of_kinds = list({one.kind: one for one in reversed(best_of_kinds)}.values())[::-1]
+    on_step(STEPS[1])
     iterations = budget.count(_GROWTH_ITERATIONS, 10)
     for one in best_of_kinds[:_GROWN_KINDS]:
         ladder = sizes(max(len(one.theta), 2), starts.most(one.regressors))
@@ -136,6 +147,7 @@ def _search_structure(search: Search, options: EnergyOptions) -> None:
         units = max(1, round(len(best.theta) * rng.uniform(*_RELATIVE_SIZES)))
         further.append(starts.random(regressors, units, "random"))
     if further:
+        on_step(STEPS[2])
         search.halve(further, [budget.count(k, 5) for k in _ROUNDS])
 
 

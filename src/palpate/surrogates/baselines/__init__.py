@@ -1,7 +1,8 @@
 """Baselines: what of an energy is known before anything is learnt, one file for each kind of interaction.
 
 baseline            the contract, and the registry by name
-contact_baseline    a sphere that presses a surface
+contact_baseline    a sphere that presses a surface, by the closest point
+overlap_baseline  the same, by all of the surface that it meets
 pad_baseline        a patch or node that is held and displaced
 constant_baseline   a constant, for several loads whose place of rest moves
 """
@@ -15,6 +16,7 @@ from palpate.surrogates.baselines.baseline import (
 )
 from palpate.surrogates.baselines.constant_baseline import ConstantBaseline
 from palpate.surrogates.baselines.contact_baseline import ContactBaseline, depth_series
+from palpate.surrogates.baselines.overlap_baseline import OverlapBaseline
 from palpate.surrogates.baselines.pad_baseline import PadBaseline
 from palpate.surrogates.baselines.rest_stiffness import RestStiffness
 from palpate.surrogates.baselines.stiffening import Stiffening
@@ -23,6 +25,7 @@ __all__ = [
     "Baseline",
     "ConstantBaseline",
     "ContactBaseline",
+    "OverlapBaseline",
     "PadBaseline",
     "RestStiffness",
     "Solves",

@@ -115,6 +115,11 @@ class Baseline(ABC):
         """The touched surface at rest; None where nothing is touched."""
         return None
 
+    @property
+    def surfaces(self) -> tuple[TouchedSurface, ...]:
+        """All fields of distances among the arguments of the kernels, the touched surface first."""
+        return () if self.surface is None else (self.surface,)
+
     def with_surface(self, surface: TouchedSurface) -> Baseline:
         """Return the same baseline on another touched surface; itself where it has none."""
         return self

@@ -3,23 +3,27 @@
  * arrays: 0 numbers: twice the law's power, its factor and length a, R, the parameter that R is or -1, a step (m);
  * 1 to 3 the touched surface: frame, coefficients, profile
  */
+PP_PART pp_real contact_law(const pp_real *own, pp_real s, pp_real *slope, pp_real *bend) {
+  const pp_real power = R(0.5) * own[0], length = own[2], r = s / (length + s);
+  pp_real g = own[1];
+  if (own[0] == R(5)) g *= PP_SQRT(s);
+  if (own[0] == R(6)) g *= s;
+  g /= PP_SQRT(R(1) + s / length);
+  *slope = g * s * (power - R(0.5) * r);
+  *bend = g * (power * (power - R(1)) - power * r + R(0.75) * r * r);
+  return g * s * s;
+}
+
 PP_PART int contact_enter(const pp_model *m, const pp_real *x, const pp_real *p, pp_work *w) {
-  const pp_real *own = pp_baseline_array(m, 0)->real, *numbers = m->a[PP_NUMBERS].real, length = own[2];
+  const pp_real *own = pp_baseline_array(m, 0)->real, *numbers = m->a[PP_NUMBERS].real;
   const int32_t which = (int32_t)own[4];
   const pp_real radius = which < 0 ? own[3] : p[which];
   const pp_real s = radius - pp_distance(x, w->outward, w->surface, pp_baseline_array(m, 1));
-  pp_real g = own[1], r, slope, bend, depth, unused, none;
-  const pp_real power = R(0.5) * own[0];
+  pp_real slope, bend, depth, unused, none;
   int i, j;
   w->base[1] = s;
   if (s <= R(0)) return 0;
-  if (own[0] == R(5)) g *= PP_SQRT(s);
-  if (own[0] == R(6)) g *= s;
-  r = s / (length + s);
-  g /= PP_SQRT(R(1) + s / length);
-  w->base[0] = g * s * s;
-  slope = g * s * (power - R(0.5) * r);
-  bend = g * (power * (power - R(1)) - power * r + R(0.75) * r * r);
+  w->base[0] = contact_law(own, s, &slope, &bend);
   w->base[2] = R(0);
   w->base[3] = PP_SQRT(R(2) * w->base[0]);
   depth = pp_saturated(s, numbers[1], numbers[2], &unused, &none);

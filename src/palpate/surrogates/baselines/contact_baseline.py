@@ -38,7 +38,7 @@ from palpate.surrogates.energy_kernels import (
 from palpate.surrogates.surface import TouchedSurface, distance_into
 from palpate.units import Range
 
-__all__ = ["ContactBaseline", "depth_series"]
+__all__ = ["ContactBaseline", "depth_series", "leave_contact"]
 
 
 # step over the probe's radius, of the difference that finds the third derivative of the distance
@@ -133,7 +133,7 @@ class ContactBaseline(Baseline):
         own = -1 if self.radius_at is None else self.radius_at - 3
         usual = self.probe_radius if math.isfinite(self.probe_radius) else self.touched.reach
         numbers = np.array([*self.law.numbers(), self.probe_radius, own, _STEP * usual])
-        return Compiled(None, (numbers, self.touched.compiled()), enter=_enter, leave=_leave)
+        return Compiled(None, (numbers, self.touched.compiled()), enter=_enter, leave=leave_contact)
 
     def c_source(self) -> str:
         """Return the kernels in C99."""
@@ -143,6 +143,16 @@ class ContactBaseline(Baseline):
         """Return the depth s (N,) of the rigid probe in the surface at rest, m."""
         return np.asarray(self._radii(X) - self.touched.at(np.ascontiguousarray(X[:, :3]))[0])
 
+    def law_depth(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the depth (N,) in m that the law takes, and its gradient and Hessian with the other sign."""
+        distance, normal, bend = self.touched.at(np.ascontiguousarray(X[:, :3]))
+        return self._radii(X) - distance, normal, bend
+
+    def raised(self, height: float, surface: TouchedSurface) -> ContactBaseline:
+        """Return the same contact on a surface that is higher by `height` (m) along its normal."""
+        del height
+        return replace(self, touched=surface)
+
     def _radii(self, X: np.ndarray) -> np.ndarray:
         return np.full(len(X), self.probe_radius) if self.radius_at is None else X[:, self.radius_at]
 
@@ -151,8 +161,8 @@ class ContactBaseline(Baseline):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return ln U₀ (N,), its gradient (N, n) and its Hessian (N, n, n) by all inputs, at X (N, n) in contact."""
         n = len(inputs)
-        distance, normal, bend = self.touched.at(np.ascontiguousarray(X[:, :3]))
-        value, first, second = self.law.log(self._radii(X) - distance)
+        depth, normal, bend = self.law_depth(X)
+        value, first, second = self.law.log(depth)
         gradient, hessian = np.zeros((len(X), n)), np.full((len(X), n, n), np.nan)
         gradient[:, :3] = -first[:, None] * normal
         if self.radius_at is not None:  # the sphere grows into the body
@@ -248,7 +258,7 @@ def _bend_into(x, g, small, step, surface) -> None:  # type: ignore[no-untyped-d
 
 
 @part
-def _leave(position, base, small, numbers, args) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def leave_contact(position, base, small, numbers, args) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Take ∇ℓ and ∇²ℓ by c̃ = c + m ∇d, m = s − σ(s), to those by c.
 
     J = I + m ∇²d − (1 − σ') ∇d ∇dᵀ takes g to J g and ∇²ℓ to J ∇²ℓ J, and with h = ∇²d g there remains

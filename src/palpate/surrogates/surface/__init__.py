@@ -9,9 +9,11 @@
     distance_table     splines through such distances
     distance_kernels   their compiled evaluation
     touched_surface    TouchedSurface, which the others make
+    ball_overlap       Overlap, all of the surface that a ball meets
 """
 
+from palpate.surrogates.surface.ball_overlap import Overlap
 from palpate.surrogates.surface.distance_kernels import distance_into, distances_into
 from palpate.surrogates.surface.touched_surface import TouchedSurface
 
-__all__ = ["TouchedSurface", "distance_into", "distances_into"]
+__all__ = ["Overlap", "TouchedSurface", "distance_into", "distances_into"]

@@ -24,7 +24,7 @@ from palpate.errors import UsageError
 from palpate.surrogates.surface.distance_kernels import distances_into
 from palpate.surrogates.surface.measured_distance import BEHIND, ROLLED, TURN, MeasuredDistance
 
-__all__ = ["DistanceTable", "tabulate"]
+__all__ = ["CLEAR", "DistanceTable", "tabulate", "through_nodes"]
 
 # change of slope from cell to cell, below which the field is smooth, above which it is sharp
 SMOOTH, SHARP = 0.4, 0.8
@@ -125,6 +125,11 @@ def _spline(f: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     own = (slice(PAD, -PAD),) * f.ndim
     values, through = f[own], _through(f)[own]
     return _straight(values + share[own] * (through - values)), share
+
+
+def through_nodes(f: np.ndarray, spacing: float) -> np.ndarray:
+    """Return coefficients of the spline through values f on a lattice, rounded at kinks; f is 0 at the rim."""
+    return _spline(np.pad(f, PAD), spacing)[0]
 
 
 def _second(f: np.ndarray, axis: int) -> np.ndarray:

@@ -19,8 +19,8 @@ export type Row = readonly [string, string];
 
 interface Known {
   meta: Record<string, unknown>;
-  max_force: number;
-  scale: number;
+  max_force?: number; // of a body that is touched
+  scale?: number;
 }
 
 /** `own`: what the kind of body has to say of itself. */
@@ -36,10 +36,11 @@ export function about(hello: Known, own: Row[]): void {
     .replaceChildren(table([...loose, ...own, ...figures(hello)]), ...groups.map(([key, value]) => group(key, value)));
 }
 
-function figures(hello: Known): Row[] {
+function figures({ max_force: force, scale }: Known): Row[] {
+  if (force === undefined || scale === undefined) return [];
   return [
-    ["force limit", `${tidy(hello.max_force)} N`],
-    ["1 mm of the hand is", `${tidy(hello.scale)} mm at the body`],
+    ["force limit", `${tidy(force)} N`],
+    ["1 mm of the hand is", `${tidy(scale)} mm at the body`],
   ];
 }
 

@@ -1,6 +1,7 @@
 // The three ways in which a touched body is drawn and held: a line, a surface that is pressed, a patch that is held.
 
 import type { Arrow } from "./arrow";
+import { NO_NEUTRAL } from "./colour";
 import type { Link } from "./connection";
 import { Field, Indentation } from "./field";
 import { PullHand } from "./hand";
@@ -163,8 +164,10 @@ class PressedBody implements Body {
     choices(this.infos, (other) => this.choose(other), index);
     element("trust-toggle").setAttribute("aria-pressed", String(this.trusting));
     element("legend-note").hidden = !this.trusting;
-    legend(this.info);
-    if (this.info) this.view!.neutral(nothing(this.info));
+    // where the force is known well is no place without anything to show
+    const none = this.trusting || !this.info ? NO_NEUTRAL : nothing(this.info);
+    legend(this.info, none);
+    if (this.info) this.view!.neutral(none);
     this.draw();
   }
 
@@ -266,9 +269,9 @@ function deviations({ values }: TrustMap): Float32Array {
   return values.map((v) => 100 * Math.max(v, 0));
 }
 
-/** Shares of the colour scale of a map: -1 where nothing was trained. */
+/** Shares of the colour scale of a map: -1 where nothing was trained, -2 where nobody touches. */
 function certainty({ values, high }: TrustMap): Float32Array {
-  return values.map((v) => (v >= 0 ? v / high : v < -1.5 ? -1 : 0));
+  return values.map((v) => (v >= 0 ? v / high : v < -1.5 ? -1 : -2));
 }
 
 function same(a: Float32Array, b: Float32Array): boolean {

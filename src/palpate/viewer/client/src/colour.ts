@@ -10,6 +10,7 @@ const VIRIDIS = [
 const [BRIGHTEST, DARKEST] = [0.9, 0.16];
 const NEUTRAL = [0.81, 0.83, 0.845] as const;
 const FADE = 0.14; // of full scale, from the neutral to the full colour
+export const NO_NEUTRAL = -1; // a share that is far from all of a scale: no part of it is neutral
 
 export type Rgb = [number, number, number];
 

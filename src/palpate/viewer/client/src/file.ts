@@ -1,10 +1,12 @@
 // The entry of a page that is one file: everything is in it, and nothing is fetched. `palpate export html` writes the file's parts
 // (palpate/viewer/file_page.py) as scripts of other types, packed by gzip.
 
+import { answers } from "./answers";
 import { DepthCurve } from "./depth_curve";
 import { Evaluator } from "./evaluator";
 import { say } from "./flags";
 import { FileConnection } from "./file_connection";
+import { json, part, words } from "./file_parts";
 import { IndentationDrawing } from "./indentation_drawing";
 import { LineShape } from "./line_shape";
 import type { LineFacts } from "./line_shape";
@@ -23,33 +25,6 @@ interface Facts {
   drawn: { surface: SurfaceFacts; binding: BindingFacts } | null; // the body's own surface, which the other carries
   fields: FieldFacts[];
   line: LineFacts | null;
-}
-
-/** Bytes from base64. */
-function bytes(text: string): Uint8Array<ArrayBuffer> {
-  const own = Uint8Array as unknown as { fromBase64?: (text: string) => Uint8Array<ArrayBuffer> }; // of newer browsers
-  if (own.fromBase64) return own.fromBase64(text);
-  const decoded = atob(text);
-  const out = new Uint8Array(decoded.length);
-  for (let i = 0; i < decoded.length; i++) out[i] = decoded.charCodeAt(i);
-  return out;
-}
-
-async function part(name: string): Promise<Uint8Array<ArrayBuffer>> {
-  const stream = new Blob([bytes(document.getElementById(`palpate-${name}`)!.textContent!)]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
-async function json<Type>(name: string): Promise<Type> {
-  return JSON.parse(new TextDecoder().decode(await part(name))) as Type;
-}
-
-/** Words of eight bytes, whose bytes of equal weight stand together. */
-function words(bytes: Uint8Array): Uint8Array {
-  const count = bytes.length / 8;
-  const out = new Uint8Array(bytes.length);
-  for (let i = 0; i < count; i++) for (let b = 0; b < 8; b++) out[8 * i + b] = bytes[b * count + i]!;
-  return out;
 }
 
 async function open(): Promise<void> {
@@ -93,4 +68,5 @@ function offerStraightening(rest: MovingRest): void {
 }
 
 document.documentElement.dataset["file"] = "";
-open().catch((error: unknown) => say(String(error), "bad"));
+if (document.documentElement.dataset["mode"] === "answers") answers();
+else open().catch((error: unknown) => say(String(error), "bad"));

@@ -79,7 +79,7 @@ function ordinary(frame: Frame, places: Places): Flag {
 
 export function say(words: string, tone: "bad" | "calm"): void {
   const banner = element("banner");
-  banner.textContent = words;
+  if (banner.textContent !== words) banner.textContent = words; // read aloud once
   banner.dataset["tone"] = tone;
   banner.hidden = false;
 }

@@ -55,7 +55,7 @@ export class Learning {
     if (!latest) return;
     if (latest.error_p95 === null) {
       element("error-p95").textContent = element("error-median").textContent = "–";
-      element("improved").textContent = "not checked yet";
+      element("improved").textContent = latest.trial || "not checked yet"; // the error of the one before
       return;
     }
     const error = latest.error_p95;
@@ -78,7 +78,9 @@ export class Learning {
     const left = latest.remaining === null || this.ended ? null : Math.max(0, latest.remaining - since);
     element("remaining").textContent = left === null ? "" : left < 1 ? ", a little longer" : `, about ${roughly(left)}`;
     const rest = latest.remaining === null ? 0 : Math.min(since / Math.max(latest.remaining, 1), 1);
-    element<HTMLProgressElement>("work-share").value = latest.share + (0.98 - latest.share) * rest;
+    const bar = element<HTMLProgressElement>("work-share");
+    if (latest.remaining === null && latest.share === 0) bar.removeAttribute("value"); // at work, for an unknown time
+    else bar.value = latest.share + (0.98 - latest.share) * rest;
     const passed = latest.seconds + since;
     const [minutes, seconds] = [Math.floor(passed / 60), Math.floor(passed % 60)];
     element("elapsed").textContent = `${minutes ? `${minutes} min ` : ""}${seconds} s since the start`;
@@ -95,7 +97,7 @@ function roughly(seconds: number): string {
 let fading = 0;
 
 /** Say something on the picture for some seconds. */
-function toast(words: string): void {
+export function toast(words: string): void {
   const box = element("toast");
   box.textContent = words;
   box.hidden = false;

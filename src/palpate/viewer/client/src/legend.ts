@@ -4,12 +4,12 @@ import { gradient } from "./colour";
 import type { FieldInfo, TrustMap } from "./messages";
 import { capital, element, multiple, tidy, worded } from "./units";
 
-/** Show the scale of a quantity; null hides it. */
-export function legend(info: FieldInfo | null): void {
+/** Show the scale of a quantity; null hides it. `none` is the share of it at which there is nothing to show. */
+export function legend(info: FieldInfo | null, none = info ? nothing(info) : 0): void {
   element("legend").hidden = !info;
   if (!info) return;
   const { size, unit } = scale(info);
-  element("legend-bar").style.background = gradient(nothing(info));
+  element("legend-bar").style.background = gradient(none);
   element("legend-title").textContent = unit ? `${info.name} (${unit})` : info.name;
   element("legend-ticks").replaceChildren(
     ...[0, 0.5, 1].map((t) => worded("span", tidy((info.low + t * (info.high - info.low)) / size))),

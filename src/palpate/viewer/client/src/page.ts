@@ -1,6 +1,7 @@
-// The entry of every page. The server says which one it is: of a touched body, of a solved one that is looked at, or of a part
-// that is set up and learnt.
+// The entry of every page. The server says which one it is: of a touched body, of a solved one that is looked at, of a part
+// that is set up and learnt, or of a surrogate that answers inputs and is not touched.
 
+import { answers } from "./answers";
 import { joinServer } from "./connection";
 import { part } from "./part";
 import { shown } from "./shown";
@@ -9,4 +10,5 @@ import { touch } from "./touch";
 const mode = document.documentElement.dataset["mode"];
 if (mode === "shown") shown();
 else if (mode === "part") part();
+else if (mode === "answers") answers();
 else touch({ connect: joinServer });

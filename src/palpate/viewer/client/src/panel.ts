@@ -11,6 +11,7 @@ import { element, fixed, input, interval, measured, rangeUnit, round125, share, 
 
 const EVERY = 80; // ms between changes of the numbers: faster can't be read
 const AT_FIRST = 0.5; // of the deepest trained depth, how deep a press goes
+const SAME = 1e-6; // of a range, by which its ends may differ and still be as far
 const MOST = 1.25; // so that it can be seen what lies outside
 const NUMBERS = ["force-norm", "force-x", "force-y", "force-z", "tip-x", "tip-y", "tip-z", "tip-norm"];
 const UNKNOWN = [...NUMBERS, "depth", "stiffness", "rate", "picture-rate"];
@@ -35,6 +36,7 @@ export class Panel {
   private flagged = "";
   private hello: Hello | null = null;
   private last = 0;
+  private error: number | null = null; // of the force over all places, at the 95th percentile
 
   recolour(): void {
     this.force.recolour();
@@ -81,6 +83,11 @@ export class Panel {
     ]);
   }
 
+  /** Take the force error over all places, relative, at the 95th percentile; null where it is not known. */
+  state(error: number | null): void {
+    this.error = error;
+  }
+
   /** Show how deep (m) the next press goes. */
   depth(depth: number): void {
     input("depth-wanted").valueAsNumber = depth;
@@ -119,6 +126,7 @@ export class Panel {
   lost(): void {
     for (const id of UNKNOWN) put(id, NaN, 0);
     element("trust").textContent = element("deviation").textContent = "–";
+    this.compare(false);
     delete document.documentElement.dataset["tick"];
     this.list([{ id: "lost", tone: "bad", words: "Disconnected: nothing is known of the body. Trying again." }]);
   }
@@ -136,7 +144,17 @@ export class Panel {
     put("stiffness", felt ? frame.stiffness : NaN, 0);
     element("trust").textContent = !felt ? "–" : frame.inside ? "inside" : "outside";
     element("deviation").textContent = deviation(frame, this.hello!);
+    this.compare(element("deviation").textContent.startsWith("±"));
     record(frame); // one frame, whole
+  }
+
+  /** Say beside the deviation at this place how it goes together with the error over all places. */
+  private compare(stated: boolean): void {
+    const note = element("deviation-note");
+    note.hidden = !stated || this.error === null;
+    if (this.error === null) return;
+    const words = `An estimate for this place. Over all places it is ${share(this.error)} at most, for 95 of 100 presses.`;
+    if (note.textContent !== words) note.textContent = words;
   }
 
   /** The list of flags; changed only when they change, since it is read aloud. */
@@ -222,7 +240,9 @@ function trained(ranges: readonly RangeInfo[]): HTMLElement[] {
   const groups = new Map<string, string[]>();
   for (const { words, low, high, unit } of ranges) {
     const [, stem, axis] = /^(.* along )([xyz])$/.exec(words) ?? ["", words, ""];
-    const key = `${stem}\t${interval(low, high, unit)}`;
+    // as far to both sides: also where a mirrored body was loaded to one side alone
+    const both = low < 0 && Math.abs(low + high) < SAME * high;
+    const key = `${stem}\t${both ? `up to ${measured(high, unit)} either way` : interval(low, high, unit)}`;
     groups.set(key, [...(groups.get(key) ?? []), axis!]);
   }
   return [...groups].map(([key, axes]) => {
@@ -236,7 +256,7 @@ function trained(ranges: readonly RangeInfo[]): HTMLElement[] {
 /** The deviation of the force, in words. */
 function deviation(frame: Frame, hello: Hello): string {
   if (!frame.grabbed || (!hello.holds && frame.depth <= 0)) return "–"; // no force, no deviation
-  return Number.isNaN(frame.deviation) ? "not known" : `± ${share(frame.deviation)}`;
+  return Number.isNaN(frame.deviation) || !frame.inside ? "not known" : `± ${share(frame.deviation)}`;
 }
 
 function put(id: string, value: number, decimals: number): void {

@@ -2,7 +2,7 @@
 
 import { joinServer } from "./connection";
 import { say, status } from "./flags";
-import { Learning } from "./learning";
+import { Learning, toast } from "./learning";
 import {
   decodePartFaces,
   decodeSurface,
@@ -18,13 +18,15 @@ import {
 import type { LearningProgress, PartFacts, PartNews, StartWish } from "./messages";
 import { PartView } from "./part_view";
 import { Refusal } from "./refusal";
+import { lose } from "./restart";
 import { Setup } from "./setup";
 import { mode, watch } from "./skeleton";
 import { touch } from "./touch";
 import type { Touched } from "./touch";
 import { element, tidy } from "./units";
 
-const GONE = "The server of this page has ended. Give the command again";
+const GONE = "The server of this page has ended. Give the command again, and open the new address that the terminal shows";
+const PRESS = "You can press it now.";
 const PIECE = 900; // triangles in a message: the server takes 4 kB
 const AGAIN = 1000; // ms until a lost connection is tried again
 
@@ -39,6 +41,7 @@ let loading: Promise<PartFacts> | null = null;
 let touched: Touched | null = null;
 let news: PartNews | null = null;
 let progress: LearningProgress | null = null;
+let roomy = false; // there is room above the part for the ball
 const learning = new Learning(() => send(encodeEndWish({ sure: true })));
 
 export function part(): void {
@@ -66,9 +69,8 @@ function served(on: boolean): void {
     element("banner").hidden = true;
     return;
   }
-  status("lost", "disconnected, trying again");
   const stays = news?.stage === "choosing" ? "what is chosen here stays while the page is open." : "it goes on where it stopped.";
-  say(`${GONE}: ${stays}`, "bad");
+  lose(`${GONE}: ${stays}`);
 }
 
 function send(message: string | ArrayBuffer): void {
@@ -82,6 +84,7 @@ function hear(message: { kind: string }): void {
   progress = message;
   learning.hear(message);
   element("model-line").textContent ||= message.phase;
+  touched?.state(message.error_p95);
   if (touched) touched.mark(message.places);
   else view?.mark(message.places);
 }
@@ -107,14 +110,14 @@ function isOther(message: PartNews, before: PartNews): boolean {
 
 /** Say why the part is refused, and offer a wrap. */
 function refuse({ words, wrap }: PartNews): void {
-  status("live", "refused");
+  status("connecting", "refused");
   mode("refused");
   refusal ??= new Refusal(words, wrap, (size) => send(JSON.stringify({ kind: "WrapWish", size })));
 }
 
 /** Show the part with all that can be chosen. */
 function choose(): void {
-  status("live", "set it up");
+  status("connecting", "not started yet");
   if (news?.words) say(news.words, "calm");
   loading ??= open();
   loading
@@ -135,7 +138,7 @@ async function open(): Promise<PartFacts> {
     get("part/faces").then(async (answer) => decodePartFaces(await answer.arrayBuffer())),
   ]);
   if (!isPartFacts(facts)) throw new Error("the server speaks of something else");
-  view = new PartView(canvas, surface, faces, ["title", "tools", "scale-notes"].map(element));
+  view = new PartView(canvas, surface, faces, ["title", "tools", "scale-notes", "legend"].map(element));
   element("model-line").textContent = `${facts.file}, ${facts.size.map((side) => tidy(1000 * side)).join(" × ")} mm`;
   if (progress) view.mark(progress.places);
   return facts;
@@ -161,6 +164,7 @@ function work(message: PartNews): void {
   if (element("banner").dataset["tone"] === "calm") element("banner").hidden = true; // of a wrap
   if (message.stage === "ended") learning.end(message.words);
   else if (message.words) element("phase").textContent = message.words;
+  wait();
   if (message.version > 0) {
     touched ??= joinTouch();
     return;
@@ -173,7 +177,20 @@ function work(message: PartNews): void {
   }
   status("connecting", message.stage === "ended" ? "ended" : "solving");
   loading ??= open();
-  loading.then(() => view?.look()).catch(fail);
+  loading
+    .then(() => {
+      if (!roomy) view?.leaveRoom();
+      roomy = true;
+    })
+    .catch(fail);
+}
+
+/** Say whether the part can be pressed yet, and what happens meanwhile. */
+function wait(): void {
+  const over = news?.stage === "ended";
+  const yet = over ? "" : "It can't be pressed yet. A first version comes after the first solves, in about a minute; you need not wait here.";
+  const words = root.dataset["touching"] ? (over ? PRESS : `${PRESS} Solves go on, and make it better meanwhile.`) : yet;
+  if (element("pressable").textContent !== words) element("pressable").textContent = words; // read aloud once
 }
 
 function joinTouch(): Touched {
@@ -182,10 +199,13 @@ function joinTouch(): Touched {
       view.dispose();
       view = null;
     }
+    if (!root.dataset["touching"]) toast(PRESS);
     root.dataset["touching"] = String(version);
+    wait();
   };
-  const joined = touch({ connect: joinServer, renewed });
+  const joined = touch({ connect: joinServer, renewed, before: () => view });
   if (progress) joined.mark(progress.places);
+  joined.state(progress?.error_p95 ?? null);
   return joined;
 }
 

@@ -18,6 +18,7 @@ import type { PartFaces, Surface, Vec3 } from "./messages";
 import { SurfaceView } from "./surface_view";
 import { css } from "./units";
 
+const ROOM = 0.32; // of the part's size, above it, for the ball and its arrow
 const LAYERS = { ghost: false, mesh: false };
 
 /** A place that was pointed at. */
@@ -154,6 +155,12 @@ export class PartView extends SurfaceView {
   /** Where a triangle's middle is on the canvas, CSS pixels: for programs that drive the page. */
   spot(triangle: number): { x: number; y: number } {
     return this.project(new Vector3(...this.middles.subarray(3 * triangle, 3 * triangle + 3)));
+  }
+
+  /** Leave room above the part for what is drawn there once it is touched, so that nothing moves then. */
+  leaveRoom(): void {
+    this.roof = ROOM * this.across();
+    this.look();
   }
 
   /** The size of the part, m. */

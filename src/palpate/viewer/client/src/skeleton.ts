@@ -7,13 +7,14 @@
 // refused a part whose surface bounds no body, and may be wrapped
 // setup   a part that is set up
 // work    a part that is solved and can't be touched yet
+// answers a surrogate that answers inputs and is not touched
 //
 // What belongs to solving and learning is marked by data-learn, and seen beside any of them.
 
 import { element } from "./units";
 import type { View } from "./view";
 
-export type Mode = "line" | "press" | "pad" | "shown" | "refused" | "setup" | "work";
+export type Mode = "line" | "press" | "pad" | "shown" | "refused" | "setup" | "work" | "answers";
 
 const LABELS: Record<Mode, string> = {
   line: "The body. Arrow keys pull the held end, Escape lets it go.",
@@ -23,6 +24,7 @@ const LABELS: Record<Mode, string> = {
   refused: "No body yet: its surface is refused.",
   setup: "The body, which can be touched later.",
   work: "The body, which can be touched later.",
+  answers: "The body, coloured by the chosen field. The mouse turns it, a click reads a value.",
 };
 
 /** Show the parts that belong to a mode; at first none of them are seen. */

@@ -37,6 +37,7 @@ const STANCE = {
 };
 
 const UNKNOWN = -0.5; // a share below it means that nothing is known there
+const UNTOUCHED = -1.5; // and below this one, that nobody touches it
 const OPEN = 1e-4; // sum of a surface's area vectors over its area, from which on it has a border
 const DOT = 0.006; // of the body's size, radius of a dot
 
@@ -69,6 +70,7 @@ export class SurfaceView extends View {
   protected readonly probe: Mesh<SphereGeometry, MeshLambertMaterial>;
   private colours = numbers(palette());
   private readonly unknown = new Color();
+  private readonly untouched = new Color();
   private readonly low = new Vector3().setScalar(Infinity);
   private readonly high = new Vector3().setScalar(-Infinity);
   private dots: InstancedMesh<SphereGeometry, MeshBasicMaterial> | null = null;
@@ -130,7 +132,7 @@ export class SurfaceView extends View {
     this.look();
   }
 
-  /** Take over one state: displacements at `factor` times their size, colours by each point's share of the scale, -1: unknown. */
+  /** Take over one state: displacements at `factor` times their size, colours by each point's share of the scale; -1: unknown, -2: not touched. */
   deform(
     displacement: Float32Array,
     factor: number,
@@ -157,10 +159,10 @@ export class SurfaceView extends View {
 
   private tint(shares: ArrayLike<number>): void {
     const [tints, colours] = [this.colour.array, this.colours];
-    const { r, g, b } = this.unknown;
     for (let i = 0; i < shares.length; i++) {
       const share = shares[i]!;
       const known = share >= UNKNOWN;
+      const { r, g, b } = share < UNTOUCHED ? this.untouched : this.unknown;
       const k = 3 * (share > 0 ? (share < 1 ? (255 * share + 0.5) | 0 : 255) : 0);
       tints[3 * i] = known ? colours[k]! : r;
       tints[3 * i + 1] = known ? colours[k + 1]! : g;
@@ -218,6 +220,7 @@ export class SurfaceView extends View {
     this.fixed.material.color.set(css("--accent-2"));
     this.floor.material.color.set(css("--grid"));
     this.unknown.set(css("--unknown"));
+    this.untouched.set(css("--untouched"));
     this.dots?.material.color.set(css("--ink"));
     this.probe.material.color.set(css("--accent"));
     this.probe.material.emissive.set(css("--accent")).multiplyScalar(0.25);

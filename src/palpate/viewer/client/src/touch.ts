@@ -10,8 +10,10 @@ import type { Frame, Hello, Vec3 } from "./messages";
 import { Panel } from "./panel";
 import { Drops, feel } from "./reason";
 import { Recorder } from "./recorder";
+import { lose } from "./restart";
 import { mode, watch } from "./skeleton";
 import { element, fixed, worded } from "./units";
+import type { View } from "./view";
 
 const SILENT = 1500; // ms without a picture until the page says so
 const SAME = 1e-9; // what differs by less is drawn alike
@@ -22,6 +24,8 @@ const canvas = element<HTMLCanvasElement>("view");
 export interface Touched {
   /** Draw dots where solves are done, m. */
   mark(places: readonly Vec3[]): void;
+  /** Take the force error over all places, relative, at the 95th percentile; null where it is not known. */
+  state(error: number | null): void;
   /** Version of the body that is drawn; 0 before the first picture. */
   readonly version: number;
 }
@@ -32,12 +36,14 @@ export interface Joint {
   renewed?(version: number): void;
   /** Join whoever answers: the server, or the page itself. */
   connect(listener: Listener): Link;
+  /** The view in whose place the body's comes, to look from the same place. */
+  before?(): View | null;
   /** Hears of each picture. */
   seen?(frame: Frame): void;
 }
 
 /** Show a touched body. */
-export function touch({ connect, renewed = () => {}, seen = () => {} }: Joint): Touched {
+export function touch({ connect, renewed = () => {}, before = () => null, seen = () => {} }: Joint): Touched {
   const panel = new Panel();
   let hello: Hello | null = null;
   let body: Body | null = null;
@@ -91,7 +97,9 @@ export function touch({ connect, renewed = () => {}, seen = () => {} }: Joint): 
     body = bodyOf(news, canvas, connection, panel);
     await body.open(); // without WebGL this fails, and the numbers are still shown
     notes();
-    body.view!.look(); // now that the words stand where they will
+    const part = before();
+    if (part) body.view!.stand(part);
+    else body.view!.look(); // now that the words stand where they will
     body.mark?.(places);
     if (latest) show(latest);
     drawable = news.version;
@@ -133,8 +141,7 @@ export function touch({ connect, renewed = () => {}, seen = () => {} }: Joint): 
     drops.lost();
     recorder.lost();
     element("arrow-label").hidden = true;
-    status("lost", "disconnected, trying again");
-    say("Disconnected from palpate. This page connects again as soon as the server is back.", "bad");
+    lose("Disconnected from palpate. If it was ended, start it again, and open the new address that its terminal shows.");
   }
 
   /** End the force: let go of what this page holds, stop what any other hand does. */
@@ -196,6 +203,7 @@ export function touch({ connect, renewed = () => {}, seen = () => {} }: Joint): 
       places = news;
       body?.mark?.(places);
     },
+    state: (error) => panel.state(error),
     get version() {
       return drawable;
     },

@@ -17,6 +17,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { fit, free, project } from "./framing";
 import type { Size } from "./framing";
 import { Resolution } from "./resolution";
+import { tidy } from "./units";
 
 /** First view and light of a kind of body. */
 export interface Stance {
@@ -71,6 +72,7 @@ export abstract class View {
     const ratio = resolution.share * Math.min(devicePixelRatio, 2);
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     this.renderer.render(this.scene, this.camera);
+    this.canvas.dataset["camera"] = this.camera.position.toArray().map((at) => tidy(at, 4)).join(" "); // for programs that read the page
     return true;
   }
 
@@ -100,6 +102,19 @@ export abstract class View {
     this.controls.target.copy(centre);
     [this.camera.near, this.camera.far] = [distance / 50, distance * 20];
     [this.controls.minDistance, this.controls.maxDistance] = [0.1 * distance, 4 * distance];
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.dirty = true;
+  }
+
+  /** Look from where another view of the same body looks. */
+  stand(before: View): void {
+    const { camera, controls } = before;
+    this.camera.position.copy(camera.position);
+    this.camera.quaternion.copy(camera.quaternion);
+    this.controls.target.copy(controls.target);
+    [this.camera.near, this.camera.far] = [camera.near, camera.far];
+    [this.controls.minDistance, this.controls.maxDistance] = [controls.minDistance, controls.maxDistance];
     this.camera.updateProjectionMatrix();
     this.controls.update();
     this.dirty = true;

@@ -110,7 +110,7 @@ function isOther(message: PartNews, before: PartNews): boolean {
 
 /** Say why the part is refused, and offer a wrap. */
 function refuse({ words, wrap }: PartNews): void {
-  status("live", "refused");
+  status("connecting", "refused");
   mode("refused");
   refusal ??= new Refusal(words, wrap, (size) => send(JSON.stringify({ kind: "WrapWish", size })));
 }

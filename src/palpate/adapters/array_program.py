@@ -69,10 +69,10 @@ def program_of(body: Surrogate, dtype: type[np.floating]) -> dict[str, ArrayProg
     graph = Graph(dtype)
     add_body(graph, body.hand_energy, apart=True)
     names = [node.result for node in graph.nodes if node.kind == "Identity"]
-    return {name: _needed(graph, name, len(body.inputs)) for name in names}
+    return {name: _part_for(graph, name, len(body.inputs)) for name in names}
 
 
-def _needed(graph: Graph, output: str, inputs: int) -> ArrayProgram:
+def _part_for(graph: Graph, output: str, inputs: int) -> ArrayProgram:
     """Return the part of a graph that an output needs."""
     wanted, nodes = {output}, []
     for node in reversed(graph.nodes):

@@ -126,7 +126,7 @@ def _touch_without_page(
 
     study = _study_of(part, choices, console)
     if choices.element == AUTO:
-        study = _refined(study, study_file(part, choices.name), options.workers, console)
+        study = _refine(study, study_file(part, choices.name), options.workers, console)
     _carry_on(study.with_workers(options.workers), Paths(part.parent, study.name), options, console)
 
 
@@ -204,7 +204,7 @@ def _study_of(part: Path, choices: PartOptions, console: Console) -> Study:
     return study
 
 
-def _refined(study: Study, file: Path, workers: int | None, console: Console) -> Study:
+def _refine(study: Study, file: Path, workers: int | None, console: Console) -> Study:
     """Return the study of a part with elements that finer solves have chosen; one with solves keeps its elements."""
     from palpate.study.mesh_check import refine_study
     from palpate.study.run import Paths

@@ -136,7 +136,7 @@ def whole_answers(surrogate: Surrogate) -> AnswerNetwork:
     """Return all numbers, and all values of all fields and curves; an error where there are none."""
     rows = [*_numbers(surrogate)]
     rows += [_values(shown, range(len(shown.places))) for shown in _modal_fields(surrogate)]
-    return _made(surrogate, rows, ())
+    return _assemble(surrogate, rows, ())
 
 
 def answer_network(surrogate: Surrogate, choice: Choice) -> AnswerNetwork:
@@ -162,13 +162,13 @@ def answer_network(surrogate: Surrogate, choice: Choice) -> AnswerNetwork:
             ]
             hidden_rows.append(hidden)
             first += len(hidden.outputs)
-    return _made(surrogate, rows, tuple(runs), hidden_rows)
+    return _assemble(surrogate, rows, tuple(runs), hidden_rows)
 
 
-def _made(
+def _assemble(
     surrogate: Surrogate, rows: list[_Rows], runs: tuple[_Run, ...], hidden: Sequence[_Rows] = ()
 ) -> AnswerNetwork:
-    networks = _joined([*rows, *hidden])
+    networks = _join([*rows, *hidden])
     groups = tuple(len(row.outputs) for row in rows)
     return AnswerNetwork(surrogate.name, networks, runs, _regions([*rows, *hidden]), groups)
 
@@ -245,7 +245,7 @@ def _regions(rows: Sequence[_Rows]) -> tuple[TrainedRegion, ...]:
     return tuple(regions)
 
 
-def _joined(rows: Sequence[_Rows]) -> tuple[Network, ...]:
+def _join(rows: Sequence[_Rows]) -> tuple[Network, ...]:
     """Return networks whose sum gives all these outputs: one for each radial function of the parts."""
     if not rows:
         raise UsageError(

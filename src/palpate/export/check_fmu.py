@@ -182,7 +182,7 @@ class CheckFmu:
     def answers(self, X: np.ndarray) -> np.ndarray:
         """Return `ANSWERS` numbers for each row of X (N, 3 + p); not-a-number what an FMU does not tell."""
         if self._ways:
-            return self._carried(X)
+            return self._steer(X)
         rows, asked = np.full((len(X), ANSWERS), np.nan), self._places
         self._steps.begin()
         if self._felt:
@@ -203,7 +203,7 @@ class CheckFmu:
             row[20] = TRUSTED * inside + CONTACT * contact + TOO_DEEP * deep if finite else NOT_A_NUMBER
         return rows
 
-    def _carried(self, X: np.ndarray) -> np.ndarray:
+    def _steer(self, X: np.ndarray) -> np.ndarray:
         """Return `answers` of a body that carries a mass, which begins at each place."""
         rows = np.full((len(X), ANSWERS), np.nan)
         D = self._directions()

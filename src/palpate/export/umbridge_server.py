@@ -51,7 +51,7 @@ class ServedModel:
 def served_models(model: Any) -> dict[str, ServedModel]:
     """Return the models by name that a loaded file is served as; a file that has none is refused."""
     if isinstance(model, Surrogate):
-        served = _touched(model) if model.can_be_touched else {}
+        served = _touch_models(model) if model.can_be_touched else {}
         served |= {name: _quantities(part) for name, part in model.quantities.items()}
     else:
         network = model if isinstance(model, Network) else getattr(model, "network", None)
@@ -65,7 +65,7 @@ def served_models(model: Any) -> dict[str, ServedModel]:
     return served
 
 
-def _touched(body: Surrogate) -> dict[str, ServedModel]:
+def _touch_models(body: Surrogate) -> dict[str, ServedModel]:
     energy = body.hand_energy
     directions = np.asarray(energy.baseline.directions, dtype=float)
     felt, further = len(directions), len(body.inputs) - len(directions)
@@ -157,10 +157,10 @@ class UMBridgeServer(ThreadingHTTPServer):
             status = 400 if operation in model.support else 404
             raise _ProtocolError("UnsupportedFeature", f"{name!r} does not answer {operation!r}.", status)
         x = _vectors(request.get("input"), model.sizes)
-        return {"output": _computed(operation, model, x, request), "inside": model.inside(x)}
+        return {"output": _compute(operation, model, x, request), "inside": model.inside(x)}
 
 
-def _computed(operation: str, model: ServedModel, x: np.ndarray, request: Mapping[str, Any]) -> list[Any]:
+def _compute(operation: str, model: ServedModel, x: np.ndarray, request: Mapping[str, Any]) -> list[Any]:
     if operation == "Evaluate":
         return [_finite(model.value(x))]
     for key in ("outWrt", "inWrt", "inWrt1", "inWrt2"):

@@ -48,7 +48,7 @@ def solve_finer(
     """
     if unseen is None or not isinstance(study.test, ProbeTestRecord) or not study.test.finer:
         return None
-    places = _spread(unseen.ok, study.test.finer)
+    places = _spread_rows(unseen.ok, study.test.finer)
     if not len(places):
         return None
     if paths is not None and (kept := load_finer(study, paths)) is not None and _are_in(kept.X, unseen.X):
@@ -129,7 +129,7 @@ def load_finer(study: Study, paths: Paths) -> Dataset | None:
     return data if data.provenance.get("problem") == wanted and len(data.ok) else None
 
 
-def _spread(unseen: Dataset, number: int) -> np.ndarray:
+def _spread_rows(unseen: Dataset, number: int) -> np.ndarray:
     """Return inputs (≤ number, n) of unseen solves from a light touch to the strongest, evenly by rank of the force."""
     size = np.linalg.norm(np.asarray(unseen.response)[:, :3], axis=1)
     heavy = np.flatnonzero(size > LIGHT * size.max(initial=0.0))

@@ -31,7 +31,7 @@ from palpate.sweeps.answer_files import SavedCase
 from palpate.sweeps.problem import Answer
 from palpate.sweeps.program_run import OUTPUT, last_lines, run_program
 from palpate.sweeps.space import Space, random
-from palpate.sweeps.template_files import TemplateFiles, filled_words
+from palpate.sweeps.template_files import TemplateFiles, fill_words
 from palpate.units import Range
 
 __all__ = ["READING", "CommandProblem"]
@@ -147,7 +147,7 @@ class CommandProblem:
         """Refuse a command that does not exist, and templates that can't be filled."""
         self.templates.check(self.ranges, self.constants)
         for name in self.results:
-            _require_inside(filled_words([name], {"case": "case"}, "`results`")[0])
+            _require_inside(fill_words([name], {"case": "case"}, "`results`")[0])
         if not self.results:
             raise UsageError(
                 "The solver's study names no results.", fix='Say results = ["NAME.frd"] in [solver].'
@@ -211,10 +211,10 @@ class CommandProblem:
             folder.mkdir(parents=True)
         self._write(folder, case, x)
         self._run(folder, case)
-        files = [folder / name for name in filled_words(self.results, {"case": case}, "`results`")]
+        files = [folder / name for name in fill_words(self.results, {"case": case}, "`results`")]
         saved, notes = self._read(folder, files, x)
         if difference := "; ".join(_differences(first or saved, saved)):
-            raise _failed(" ".join([f"its results differ: {difference}.", *notes]).rstrip("."), folder)
+            raise _failure_of(" ".join([f"its results differ: {difference}.", *notes]).rstrip("."), folder)
         saved.save(path)
         shutil.rmtree(folder, ignore_errors=True)
         return saved
@@ -231,20 +231,20 @@ class CommandProblem:
             sign = next((text for text in self.failure if text in output), None)
             reason = "" if sign is None else f"{self.program} printed {sign!r}"
         if reason:
-            raise _failed(reason, folder)
+            raise _failure_of(reason, folder)
 
     def _read(self, folder: Path, files: Sequence[Path], x: np.ndarray) -> tuple[SavedCase, Sequence[str]]:
         missing = [file.name for file in files if not file.is_file()]
         if missing:
-            raise _failed(f"{self.program} ended without an error, but wrote no {missing[0]}", folder)
+            raise _failure_of(f"{self.program} ended without an error, but wrote no {missing[0]}", folder)
         try:
             answers = read_case(files, self.mapping, x, self.solution)
         except (PalpateError, ChildEnded) as error:
             reason = " ".join(filter(None, (error.what, error.why)))
-            raise _failed(f"its results can't be taken: {reason}".rstrip("."), folder) from error
+            raise _failure_of(f"its results can't be taken: {reason}".rstrip("."), folder) from error
         for entry in answers.fields:
             if not np.isfinite(answers.answers[entry.name]).all():
-                raise _failed(f"{entry.name!r} in its results is not a number", folder)
+                raise _failure_of(f"{entry.name!r} in its results is not a number", folder)
         values = {entry.name: answers.answers[entry.name][0] for entry in answers.fields}
         return SavedCase(answers.layout, answers.fields, values), answers.notes
 
@@ -252,7 +252,7 @@ class CommandProblem:
         return {"case": case, "templates": os.fspath(self.templates.folder), "python": sys.executable}
 
     def _words(self, case: str) -> list[str]:
-        return filled_words(self.command, self._names(case), "The command")
+        return fill_words(self.command, self._names(case), "The command")
 
 
 def _require_inside(name: str) -> None:
@@ -267,7 +267,7 @@ class _CaseFailure(SolverError):
     """A case that has no answer; its words become the message of its row."""
 
 
-def _failed(reason: str, folder: Path) -> _CaseFailure:
+def _failure_of(reason: str, folder: Path) -> _CaseFailure:
     lines = last_lines(folder / OUTPUT)
     said = "".join(f"\n    {line}" for line in lines)
     end = f"The last lines of its output:{said}" if lines else "It printed nothing."

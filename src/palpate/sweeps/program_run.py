@@ -46,7 +46,7 @@ def run_program(
     inside = is_supervised()
     with (folder / OUTPUT).open("wb") as log:
         try:
-            process = _started(command, folder, environment, log, own_group=not inside)
+            process = _start(command, folder, environment, log, own_group=not inside)
         except OSError as error:
             return ProgramEnd(None, f"{Path(command[0]).name} could not be started: {error}", ())
         overdue = False
@@ -66,7 +66,7 @@ def run_program(
     return ProgramEnd(process.returncode, failure, last_lines(folder / OUTPUT))
 
 
-def _started(
+def _start(
     command: Sequence[str], folder: Path, environment: Mapping[str, str], log: IO[bytes], *, own_group: bool
 ) -> subprocess.Popen[bytes]:
     # this process finds its packages by PYTHONPATH; a program that is Python of another version must not

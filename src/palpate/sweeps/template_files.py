@@ -19,7 +19,7 @@ from palpate.files import system_errors
 from palpate.input_files import read_input
 from palpate.units import Range
 
-__all__ = ["DIGITS", "TemplateFiles", "filled_words"]
+__all__ = ["DIGITS", "TemplateFiles", "fill_words"]
 
 DIGITS = 12
 """Significant digits of a number in a template: with sign and exponent it fits the 20 columns that CalculiX reads."""
@@ -67,7 +67,7 @@ class TemplateFiles:
         units = {r.name: r.unit for r in values} | {name: unit for name, (_, unit) in constants.items()}
         used = set()
         for path in self.paths():
-            _filled(path.name, {"case": ""}, f"The name of the template {path}")
+            _fill(path.name, {"case": ""}, f"The name of the template {path}")
             text = self._text(path)
             for match in _MARK.finditer(text or ""):
                 used.add(_conversion(match, units, self.folder / path, text or "")[0])
@@ -150,12 +150,12 @@ def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def filled_words(words: Sequence[str], known: Mapping[str, str], what: str) -> list[str]:
+def fill_words(words: Sequence[str], known: Mapping[str, str], what: str) -> list[str]:
     """Return words with ``{case}`` and the like replaced; `what` names them for messages."""
-    return [_filled(word, known, what) for word in words]
+    return [_fill(word, known, what) for word in words]
 
 
-def _filled(word: str, known: Mapping[str, str], what: str) -> str:
+def _fill(word: str, known: Mapping[str, str], what: str) -> str:
     unknown = [name for name in _WORD.findall(word) if name not in known]
     if unknown:
         raise UsageError(

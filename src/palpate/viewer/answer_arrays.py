@@ -10,7 +10,7 @@ import numpy as np
 from palpate.network import Network
 from palpate.network.uncertainty import Uncertainty
 from palpate.surrogates import LearntQuantities
-from palpate.viewer.file_document import shuffled_words
+from palpate.viewer.file_document import shuffle_words
 
 __all__ = ["ArrayBlock", "quantities_facts"]
 
@@ -27,7 +27,7 @@ class ArrayBlock:
 
     def add(self, values: np.ndarray, kind: Literal["f4", "f8", "i4"] = "f8") -> dict[str, Any]:
         """Append an array and return where it stands, of which kind and shape it is."""
-        data = shuffled_words(np.ascontiguousarray(values, f"<{kind}").tobytes(), int(kind[1]))
+        data = shuffle_words(np.ascontiguousarray(values, f"<{kind}").tobytes(), int(kind[1]))
         facts = {"part": self.name, "at": self._size, "kind": kind, "shape": list(np.shape(values))}
         self._parts.append(data)
         self._size += len(data)

@@ -19,7 +19,7 @@ from palpate.surrogates.model_card import card_of
 from palpate.units import bounds
 from palpate.viewer.about_record import about_record
 from palpate.viewer.answer_arrays import ArrayBlock, quantities_facts
-from palpate.viewer.file_document import packed, page_document, page_statics, with_parts
+from palpate.viewer.file_document import pack, page_document, page_statics, with_parts
 from palpate.viewer.surfaces import split
 from palpate.viewer.web_server import skeleton
 
@@ -61,7 +61,7 @@ class AnswerPage:
         modal = [f for f in surrogate.fields.values() if isinstance(f, ModalField)]
         facts["curves"] = [_curve_facts(f, main) for f in modal if f.is_curve]
         parts: dict[str, str] = {}
-        room = LARGEST - sum(map(len, page_statics())) - len(packed(main.to_bytes()))
+        room = LARGEST - sum(map(len, page_statics())) - len(pack(main.to_bytes()))
         drawn: list[dict[str, Any]] = []
         left_out, meshes = [], _Meshes()
         X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
@@ -70,7 +70,7 @@ class AnswerPage:
                 continue
             block = ArrayBlock(f"answers-{len(drawn)}")
             made = _field_facts(shown, block, meshes, X)
-            text = "" if made is None else packed(block.to_bytes())
+            text = "" if made is None else pack(block.to_bytes())
             if made is None or len(text) > room:
                 left_out.append(shown.name)
                 continue
@@ -85,7 +85,7 @@ class AnswerPage:
         facts |= {"fields": drawn, "meta": about_record(surrogate.meta) | about_record(about) | missing}
         data = main.to_bytes()
         digest = hashlib.sha256(data).hexdigest()
-        parts |= {main.name: packed(data), "answers": packed(json.dumps(facts).encode())}
+        parts |= {main.name: pack(data), "answers": pack(json.dumps(facts).encode())}
         return cls(name, parts, card.to_json(), digest, tuple(left_out))
 
     def document(self) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate.format import script_json
 
-__all__ = ["packed", "page_document", "page_statics", "shuffled_words", "with_parts"]
+__all__ = ["pack", "page_document", "page_statics", "shuffle_words", "with_parts"]
 
 STATIC = Path(__file__).parent / "static"
 # how the built modules begin and end
@@ -83,11 +83,11 @@ def with_parts(parts: Mapping[str, str], card: str) -> str:
     )
 
 
-def shuffled_words(data: bytes, width: int = 8) -> bytes:
+def shuffle_words(data: bytes, width: int = 8) -> bytes:
     """Return the bytes of equal weight of all words of `width` bytes one after the other, which packs better."""
     return np.frombuffer(data, dtype=np.uint8).reshape(-1, width).T.tobytes()
 
 
-def packed(data: bytes) -> str:
+def pack(data: bytes) -> str:
     """Return bytes as base64 of their gzip."""
     return base64.b64encode(gzip.compress(data, compresslevel=9, mtime=0)).decode("ascii")

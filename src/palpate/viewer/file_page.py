@@ -30,7 +30,7 @@ from palpate.surrogates import FieldSurrogate, NodeField, Surrogate
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.viewer.about_record import about_record
 from palpate.viewer.answer_page import AnswerPage
-from palpate.viewer.file_document import packed, page_document, page_statics, shuffled_words
+from palpate.viewer.file_document import pack, page_document, page_statics, shuffle_words
 from palpate.viewer.file_line import compare_line, line_facts
 from palpate.viewer.messages import Hello, Modes
 from palpate.viewer.packed_surface import PackedSurface, rounded_points
@@ -136,9 +136,9 @@ class _Page:
         block = WeightsBlock.of(surrogate, field=keys[names[0]] if names else None)
         bare = _without_modes(block)
         parts = {
-            "surface": packed(surface.data),
-            "core": packed(built_core("core.wasm")),
-            "weights-0": packed(shuffled_words(bare.to_bytes())),
+            "surface": pack(surface.data),
+            "core": pack(built_core("core.wasm")),
+            "weights-0": pack(shuffle_words(bare.to_bytes())),
             **own_parts,
         }
         room = LARGEST - sum(map(len, parts.values())) - sum(len(text) for text in page_statics())
@@ -164,7 +164,7 @@ class _Page:
             "fields": [field.facts for field in fields],
             "line": None,
         }
-        parts |= {"hello": packed(hello.to_json().encode()), "facts": packed(json.dumps(facts).encode())}
+        parts |= {"hello": pack(hello.to_json().encode()), "facts": pack(json.dumps(facts).encode())}
         text = page_document(surrogate.name, parts, card.to_json())
         return cls(surrogate, bare, tuple(fields), left_out, text)
 
@@ -183,11 +183,11 @@ class _Page:
         }
         hello = replace(hello, meta=about_record(surrogate.meta) | about_record(_card_in_words(card)))
         parts = {
-            "core": packed(built_core("core.wasm")),
-            "weights-0": packed(shuffled_words(block.to_bytes())),
-            "line": packed(shuffled_words(nodes.to_bytes())),
-            "hello": packed(hello.to_json().encode()),
-            "facts": packed(json.dumps(facts).encode()),
+            "core": pack(built_core("core.wasm")),
+            "weights-0": pack(shuffle_words(block.to_bytes())),
+            "line": pack(shuffle_words(nodes.to_bytes())),
+            "hello": pack(hello.to_json().encode()),
+            "facts": pack(json.dumps(facts).encode()),
         }
         text = page_document(surrogate.name, parts, card.to_json())
         return cls(surrogate, block, (), (), text, nodes)
@@ -279,8 +279,8 @@ def _pack_own_surface(
     surface = PackedSurface.of(drawing.surface, step)
     facts, data = surface.binding(own, carrier, drawing.nodes)
     return {"surface": surface.facts, "binding": facts}, {
-        "drawn": packed(surface.data),
-        "binding": packed(data),
+        "drawn": pack(surface.data),
+        "binding": pack(data),
     }
 
 
@@ -292,7 +292,7 @@ def _page_field(shown: Any, block: WeightsBlock, modes: Modes, surface: PackedSu
     points = rounded_points(shown.points, surface.facts["step"])
     rounded = replace(shown, rest=rows[0], modes=rows[1:], points=points)
     bare = _without_modes(block)
-    return _PageField(shown, rounded, bare, facts, packed(shuffled_words(bare.to_bytes())), packed(data))
+    return _PageField(shown, rounded, bare, facts, pack(shuffle_words(bare.to_bytes())), pack(data))
 
 
 def _without_modes(block: WeightsBlock) -> WeightsBlock:

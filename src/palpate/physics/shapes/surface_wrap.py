@@ -76,7 +76,7 @@ def wrap_surface(surface: Surface, size: float) -> tuple[Surface, Moved]:
     points, triangles = _march(inside, low, h)
     points = _smooth(points, triangles)
     _require_whole(points, closed, size)
-    moved = _moved(points, triangles, samples, h)
+    moved = _shift(points, triangles, samples, h)
     note = f"It was wrapped, {millimetres(size)} fine: {moved}."
     wrapped = Surface(points, triangles, np.zeros(len(triangles), dtype=np.int64), notes=surface.notes)
     return replace(wrapped, notes=(*surface.notes, note)), moved
@@ -245,7 +245,7 @@ def _smooth(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return points
 
 
-def _moved(points: np.ndarray, triangles: np.ndarray, samples: np.ndarray, h: float) -> Moved:
+def _shift(points: np.ndarray, triangles: np.ndarray, samples: np.ndarray, h: float) -> Moved:
     """Return how far a wrapped surface lies from the samples of the one it was wrapped around."""
     fine, _ = split_triangles(points[triangles], h)
     distance = np.asarray(cKDTree(samples).query(fine.mean(axis=1))[0])

@@ -38,14 +38,14 @@ def finer_problem(problem: Any, places: np.ndarray) -> Any:
     levels = [np.array([*base.body.geometry.rest().corners])]
     levels += [np.array([part.lower, part.upper]) for part in wide if part.lower is not None]
     boxes = [
-        FineMesh(probe.meets, size, *map(tuple, _snapped(box, np.concatenate(levels), near).tolist()))
-        for box in _joined(corners)
+        FineMesh(probe.meets, size, *map(tuple, _snap(box, np.concatenate(levels), near).tolist()))
+        for box in _join(corners)
     ]
     finer = replace(base, fine=(*wide, *boxes))
     return finer if base is problem else replace(problem, base=finer)
 
 
-def _joined(boxes: list[np.ndarray]) -> list[np.ndarray]:
+def _join(boxes: list[np.ndarray]) -> list[np.ndarray]:
     """Return boxes (2, 3) in m with those that overlap in one: cuts close together would make slivers."""
     apart: list[np.ndarray] = []
     for box in boxes:
@@ -56,10 +56,10 @@ def _joined(boxes: list[np.ndarray]) -> list[np.ndarray]:
             else:
                 rest.append(other)
         apart = [*rest, joined]
-    return apart if len(apart) == len(boxes) else _joined(apart)
+    return apart if len(apart) == len(boxes) else _join(apart)
 
 
-def _snapped(box: np.ndarray, levels: np.ndarray, near: float) -> np.ndarray:
+def _snap(box: np.ndarray, levels: np.ndarray, near: float) -> np.ndarray:
     """Return a box (2, 3) in m whose sides coincide with levels (k, 3) that are nearer than this, in m."""
     gaps = np.abs(levels[:, None] - box)
     nearest = np.take_along_axis(

@@ -202,7 +202,7 @@ class _Pieces:
         middles, upright, of = [], [], []
         for count in np.unique(parts):
             rows = np.flatnonzero(parts == count)
-            lifted = _lifted(corners[rows], patches.normals[rows], _middles(int(count)))
+            lifted = _lift(corners[rows], patches.normals[rows], _middles(int(count)))
             middles.append(lifted[0])
             upright.append(lifted[1])
             of.append(np.repeat(rows, count * count))
@@ -224,7 +224,7 @@ class _Pieces:
         )
 
 
-def _lifted(corners: np.ndarray, normals: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _lift(corners: np.ndarray, normals: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return places (t n, 3) of the curved surface over triangles (t, 3, 3), and its normals there.
 
     They are those from which the distance is measured, see `measured_distance`.

@@ -48,7 +48,7 @@ def solver_of(path):
 def swept(tmp_path_factory):
     """Solves of a bar at 1 to 20 W of which six go wrong, and the folder."""
     study = STUDY.replace('"0 W", "10 W"', '"0 W", "20 W"').replace("[test]", "workers = 2\n\n[test]")
-    path = heated_bar(tmp_path_factory.mktemp("bar"), faults=FAULTS, samples=21, limit=2.0, study=study)
+    path = heated_bar(tmp_path_factory.mktemp("bar"), faults=FAULTS, samples=21, limit=5.0, study=study)
     solves, said = run(path)
     return path.parent, solves, said
 
@@ -66,7 +66,7 @@ def test_every_failure_costs_its_case_and_says_so(swept):
     np.testing.assert_allclose(data["temperature"][~wrong], np.outer(power[~wrong], np.linspace(0, 1, 5)))
     np.testing.assert_allclose(data.rest[:, 0], np.linspace(0, 0.4, 5))
     words = dict(zip(power, map(str, data.message), strict=True))
-    assert "took longer than 2 s and was ended" in words[1]
+    assert "took longer than 5 s and was ended" in words[1]
     assert "exit code 1" in words[2]
     assert "ERROR: the matrix is singular" in words[2]
     assert "wrote no case-" in words[3]

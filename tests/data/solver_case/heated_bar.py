@@ -17,6 +17,7 @@ with open(f"{case}.in", encoding="utf-8") as file:
 power, length = said["power in mW"] / 1000, said["length in mm"]
 fault = next((name for name, low, high in said["faults"] if low <= power < high), "")
 sys.stdout.write(f"heated bar: power {power:g} W\n")
+sys.stdout.flush()  # a program that is killed keeps what it has not written out
 if log := said.get("log"):
     with open(log, "a", encoding="utf-8") as file:
         file.write(f"begin {case}\n")

@@ -11,6 +11,7 @@ import sys
 import numpy as np
 import pytest
 
+from answering import answering, rod_solves
 from linear_bodies import (
     dataset,
     history,
@@ -41,8 +42,9 @@ TOUCHED = {
     "refined_force_median",
     "refined_force_p95",
 }
-# the band and the histories have tests of their own
-ONE_SIDED = [c for c in CRITERIA if c.key != "interval_coverage" and not c.key.startswith("history")]
+# the bands and the histories have tests of their own
+BANDS = {"interval_coverage", "answer_coverage"}
+ONE_SIDED = [c for c in CRITERIA if c.key not in BANDS and not c.key.startswith("history")]
 
 
 def rippled() -> TouchFunction:
@@ -60,6 +62,8 @@ def rippled() -> TouchFunction:
 def judged(**limits: float | None) -> Validation:
     """A body with some error in every figure, judged by these limits alone."""
     asked = Limits(**(NOTHING | limits))
+    if "answer_p95" in limits:
+        return validate(answering(), rod_solves(40), limits=asked)
     if set(limits) & TOUCHED:
         X = places()
         fine = TouchSolves(X[:40], 1.02 * force(X[:40]))

@@ -85,7 +85,8 @@ def test_no_step_is_too_long_and_no_body_too_stiff(modulus, step):
             mujoco.mj_step(model, data)
             heights.append(data.qpos[0])
     assert np.isfinite(heights).all()
-    assert max(heights) < 0.01 * 0.02 + step * math.sqrt(2 * GRAVITY * 0.02) * 0.1
+    # Euler's velocities are half a step late, which may lift an apex by half of a step's way at full speed
+    assert max(heights) < 0.5 * step * math.sqrt(2 * GRAVITY * 0.02)
     assert bool(contact.damped_steps) == any(w.category is StiffStepWarning for w in told)
 
 

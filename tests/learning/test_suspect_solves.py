@@ -81,8 +81,8 @@ def test_a_spoilt_solve_is_named_in_each_place(factors):
     assert all(set(named[row]) <= {row} for row in rows), "no other solve is ever named"
     if factors[0] != 1.0:
         assert all(named[row] == [row] for row in heavy)
-    else:  # a force that does not belong to its energy is a weaker sign: some are missed
-        assert sum(named[row] == [row] for row in heavy) >= 0.75 * len(heavy)
+    else:  # a force that does not belong to its energy is a weaker sign: most are named
+        assert sum(named[row] == [row] for row in heavy) > len(heavy) / 2
 
 
 def test_the_spoilt_solve_is_named_and_described():

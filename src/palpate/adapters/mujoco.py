@@ -148,7 +148,7 @@ class SoftContact:
 
     def detach(self) -> None:
         """Take the body out of the scene."""
-        contacts = _attached(self.model)
+        contacts = _contacts_of(self.model)
         if self in contacts:
             contacts.remove(self)
         if not contacts and self.model is not None:
@@ -242,7 +242,7 @@ _SCENES: dict[int, list[SoftContact]] = {}
 _FORMER: dict[str, Any] = {}  # callbacks that were there before
 
 
-def _attached(model: Any) -> list[SoftContact]:
+def _contacts_of(model: Any) -> list[SoftContact]:
     return _SCENES.get(id(model), []) if model is not None else []
 
 

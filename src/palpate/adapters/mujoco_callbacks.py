@@ -42,14 +42,14 @@ def _filter(behind: Any, stages: bool) -> Any:
     pointer: Any = _pointer
     view: Any = vars(numba)["carray"]
 
-    def listed(model: Any) -> bool:
+    def is_through(model: Any) -> bool:
         table = view(pointer(address), (size,), dtype=np.intp)
         through = table[0] == _ALL
         for k in range(1, size):
             through |= table[k] == model
         return through  # type: ignore[no-any-return]
 
-    passes: Any = numba.njit(listed)
+    passes: Any = numba.njit(is_through)
 
     if stages:
 

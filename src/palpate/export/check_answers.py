@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from palpate.export.answer_network import AnswerNetwork
-from palpate.export.check_points import Comparison, Difference, Precision, allowed, difference
+from palpate.export.check_points import Comparison, Difference, Precision, difference, tolerances
 from palpate.units import bounds
 
 __all__ = ["MOST_SLOPES", "Replies", "answer_places", "compare_answers"]
@@ -39,7 +39,7 @@ def compare_answers(
     precision = precision or Precision()
     X = answer_places(answers)
     wanted, (got, inside, slopes) = answers.predict(X), ask(X)
-    limit = np.max([allowed(network, X, precision) for network in answers.networks], axis=0)
+    limit = np.max([tolerances(network, X, precision) for network in answers.networks], axis=0)
     parts, first = {}, 0
     for count in (*answers.groups, *(1 for _ in answers.runs)):
         some = slice(first, first + count)

@@ -34,7 +34,6 @@ __all__ = [
     "ExportedFile",
     "Precision",
     "Releaser",
-    "allowed",
     "compare_body",
     "compare_field",
     "compare_network",
@@ -42,6 +41,7 @@ __all__ = [
     "condition",
     "difference",
     "places",
+    "tolerances",
     "true_answers",
 ]
 
@@ -120,7 +120,7 @@ class Comparison:
     def as_dict(self) -> dict[str, dict[str, float]]:
         """Return the differences by quantity, for JSON."""
         return {
-            name: {"relative": part.relative, "allowed": part.allowed, "count": part.count}
+            name: {"relative": part.relative, "tolerances": part.allowed, "count": part.count}
             for name, part in self.parts.items()
         }
 
@@ -196,7 +196,7 @@ def condition(network: Network, X: np.ndarray) -> np.ndarray:
     return np.asarray(np.maximum(size / np.maximum(total, 1e-6 * size + 1e-300), 1.0).max(axis=1))
 
 
-def allowed(network: Network, X: np.ndarray, precision: Precision) -> np.ndarray:
+def tolerances(network: Network, X: np.ndarray, precision: Precision) -> np.ndarray:
     """Return the relative difference (N,) that outputs of a network may have at X (N, n)."""
     limit = np.minimum(_TIGHT * condition(network, X), _LOOSEST)
     return np.full(len(X), precision.tolerance) if precision.single else limit
@@ -269,7 +269,7 @@ def compare_network(
         low - 0.3 * (high - low), high + 0.3 * (high - low), (1000, len(low))
     )
     Y, J = ask(X)
-    limit = allowed(network, X, precision)
+    limit = tolerances(network, X, precision)
     parts = {"outputs": difference(network.predict(X), Y, limit)}
     if J is not None:
         slopes = np.stack([network.jacobian(x) for x in X]) * (high - low)

@@ -130,7 +130,7 @@ def _build(
     whole = ExportedLibrary(done, wrappers, library, None)
     if not check:
         return whole
-    comparison = _compared(surrogate, folder / f"{done.name}.py", parts)
+    comparison = _compare(surrogate, folder / f"{done.name}.py", parts)
     why, fix = (
         "The compiler may bend the arithmetic.",
         "Nothing was written. Try another compiler, and report this.",
@@ -139,7 +139,7 @@ def _build(
     return replace(whole, comparison=comparison)
 
 
-def _compared(surrogate: Surrogate, wrapper: Path, parts: dict[str, Any]) -> Comparison:
+def _compare(surrogate: Surrogate, wrapper: Path, parts: dict[str, Any]) -> Comparison:
     """Return how far the library beside a Python wrapper is from palpate."""
     if (answers := answers_of(surrogate)) is not None:
         return compare_answers(answers, CheckModel(wrapper).replies)

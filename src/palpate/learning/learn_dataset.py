@@ -209,7 +209,7 @@ def learn(
     # a region by the paint does not remember where it was solved; a validation asks for it
     areas = {} if painted is None else {"painted": painted.record(), "solved_at": train.ok.X.tolist()}
     rows = np.arange(solves) if known.rows is None else known.rows
-    found = found.numbered(np.where(rows < 0, -1, numbers[rows]))
+    found = found.renumber(np.where(rows < 0, -1, numbers[rows]))
     meta = {**found.meta, **known.meta, **areas, "name": name, "dataset": origin}
     if found.suspects:
         meta["suspects"] = [vars(one) for one in found.suspects]

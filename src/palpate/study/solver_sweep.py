@@ -54,15 +54,15 @@ def sweep_solver(
     announce(f"Runs for each case:\n  {problem.shown_command()}")
     with OnDemandCluster(study.sweep.workers) as cluster:
 
-        def solved(path: Path, wanted: dict[str, Any]) -> Dataset:
+        def solve(path: Path, wanted: dict[str, Any]) -> Dataset:
             grown = grow(path, problem, wanted)
             return sweep(problem, path=path, **wanted, **common, cluster=cluster) if grown is None else grown
 
         log(f"{count(study.sweep.samples, 'solve')} to learn from")
-        data = solved(paths.data, train)
+        data = solve(paths.data, train)
         unseen = None
         if study.test.random:
             log("further solves for testing only, which learning never sees")
-            unseen = solved(paths.random, further)
+            unseen = solve(paths.random, further)
     problem.tidy()
     return SolverSolves(data, unseen)

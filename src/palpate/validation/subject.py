@@ -188,12 +188,12 @@ def _seen(model: Any, X: np.ndarray) -> np.ndarray:
         return np.zeros(len(X), dtype=bool)
     low, high = bounds(energy.inputs)
 
-    def scaled(places: np.ndarray) -> np.ndarray:
+    def scale(places: np.ndarray) -> np.ndarray:
         return np.asarray(2 * (places - low) / (high - low) - 1)
 
     solved_at = model.meta.get("solved_at")
-    region = energy.region if solved_at is None else TrainedRegion(scaled(np.array(solved_at)), 0.0)
-    return np.asarray(region.distances(scaled(X)) < SEEN)
+    region = energy.region if solved_at is None else TrainedRegion(scale(np.array(solved_at)), 0.0)
+    return np.asarray(region.distances(scale(X)) < SEEN)
 
 
 def _refuse_radius(energy: LearntEnergy | None, data: Dataset | TouchSolves) -> None:

@@ -65,13 +65,13 @@ def test_the_end_of_a_path_is_checked_anew(solver, monkeypatch):
     good = solver.solve(above(0.002))
     stale = solid_path.PathPoint(above(0.004), good.state)
     monkeypatch.setattr(
-        solid_solver, "follow_softened", lambda *_: solid_path.PathResult(stale, Verdict(), good.log)
+        solid_solver, "soften_and_follow", lambda *_: solid_path.PathResult(stale, Verdict(), good.log)
     )
     solver.reset()
     assert not solver.solve(above(0.004)).converged
     short = solid_path.PathPoint(above(0.002), good.state)
     monkeypatch.setattr(
-        solid_solver, "follow_softened", lambda *_: solid_path.PathResult(short, Verdict(), good.log)
+        solid_solver, "soften_and_follow", lambda *_: solid_path.PathResult(short, Verdict(), good.log)
     )
     solver.reset()
     assert not solver.solve(above(0.004)).converged

@@ -64,10 +64,10 @@ def read_case(
             why='The study says `solution = "only"`.',
             fix='Write one, or choose `solution = "last"`.',
         )
-    return _mapped(results, -1 if solution == "last" else 0, mapping, x)
+    return _map_results(results, -1 if solution == "last" else 0, mapping, x)
 
 
-def _mapped(results: Results, row: int, mapping: ImportMapping, x: np.ndarray) -> MappedCases:
+def _map_results(results: Results, row: int, mapping: ImportMapping, x: np.ndarray) -> MappedCases:
     columns = {name: replace(c, values=c.values[[row]]) for name, c in results.columns.items()}
     for entry, value in zip(mapping.inputs, x, strict=True):
         columns[entry.name] = Column(entry.name, np.array([float(value)]), entry.unit)
@@ -86,4 +86,4 @@ def read_numbers(
         for i, value in enumerate(values):
             own = name if len(values) == 1 else f"{name}.{i}"
             named[own] = Column(own, np.array([float(value)]))
-    return _mapped(Results((Path(source),), "numbers", 1, named), 0, mapping, x)
+    return _map_results(Results((Path(source),), "numbers", 1, named), 0, mapping, x)

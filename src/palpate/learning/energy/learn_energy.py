@@ -59,7 +59,7 @@ class EnergyHistory:
     meta: dict[str, Any]
     suspects: tuple[SuspectSolve, ...] = ()
 
-    def numbered(self, rows: np.ndarray) -> EnergyHistory:
+    def renumber(self, rows: np.ndarray) -> EnergyHistory:
         """Return the history whose suspects have the numbers `rows` (N,) of their solves; negative ones are dropped."""
         named = [replace(one, solve=int(rows[one.solve])) for one in self.suspects]
         return replace(self, suspects=tuple(one for one in named if one.solve >= 0))

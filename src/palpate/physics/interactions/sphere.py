@@ -134,7 +134,7 @@ class SphereProbe(PlainInteraction):
             require_fit(patch, geometry.rest().points, self.over, max(self.depth), END * self.radius)
             contacts, normals, _ = self._contact_points(patch, _GRID)
         else:  # the corners of all triangles that are pressed
-            painted = self._painted(geometry)
+            painted = self._paint(geometry)
             corners = np.unique(painted.triangles)
             contacts, normals = painted.points[corners], painted.node_normals[corners]
         ends = [contacts + normals * (self.radius - d) for d in self.depth]
@@ -178,7 +178,7 @@ class SphereProbe(PlainInteraction):
     def _spread_design(self, geometry: Geometry, samples: int, seed: int, count: int) -> np.ndarray:
         """Return positions (samples, 3) in m over places that are far from each other."""
         number = -(-samples // count)
-        contacts, normals = spread_places(self._painted(geometry), number, seed)
+        contacts, normals = spread_places(self._paint(geometry), number, seed)
         width = (self.depth[1] - self.depth[0]) / count
         first = depth_sequence((self.depth[0], self.depth[0] + width), number, seed)
         depths = first[:, None] + width * np.arange(count)
@@ -263,7 +263,7 @@ class SphereProbe(PlainInteraction):
         """Return the surface that it may meet."""
         return surface_of(geometry, self.meets, self.refinements(geometry))
 
-    def _painted(self, geometry: Geometry) -> Patch:
+    def _paint(self, geometry: Geometry) -> Patch:
         """Return the surface that is pressed, with a rim: the touched one, or its part in a given box."""
         painted = surface_of(geometry, self.touches, self.refinements(geometry))
         return painted if self.over is None else _within(painted, *self._box(painted))

@@ -36,8 +36,8 @@ __all__ = [
     "PathResult",
     "StepResult",
     "follow",
-    "follow_softened",
     "predict",
+    "soften_and_follow",
     "take_step",
 ]
 
@@ -270,7 +270,7 @@ def follow(model: SolidModel, start: PathPoint, target: np.ndarray) -> PathResul
             return PathResult(here, _given_up(tried, spent, len(log), watch.reason), tuple(log))
 
 
-def follow_softened(model: SolidModel, start: PathPoint, q: np.ndarray) -> PathResult:
+def soften_and_follow(model: SolidModel, start: PathPoint, q: np.ndarray) -> PathResult:
     """Follow the way from outside under softened pads, where they are very stiff, and stiffen them at its end.
 
     The steps are in ln k, each from the equilibrium before; one that fails is halved. Where none succeeds the way is

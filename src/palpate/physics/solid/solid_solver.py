@@ -11,7 +11,7 @@ from palpate import checks
 from palpate.errors import SolverError, UsageError
 from palpate.physics.solid.solid_model import open_problem
 from palpate.physics.solid.solid_newton import ROUND_OFF
-from palpate.physics.solid.solid_path import PathPoint, PathResult, follow, follow_softened
+from palpate.physics.solid.solid_path import PathPoint, PathResult, follow, soften_and_follow
 from palpate.physics.solid.solid_solution import SolidSolution
 from palpate.physics.solid.solid_system import is_accurate, is_stable, sparse_solver
 from palpate.physics.stop import Stop, Verdict
@@ -153,9 +153,9 @@ class SolidSolver:
             first = follow(model, self._equilibria[int(np.argmin(distances))], q)
             if first.verdict.stop is Stop.CONVERGED:
                 return first
-            again = follow_softened(model, start, q)
+            again = soften_and_follow(model, start, q)
             return PathResult(again.last, again.verdict, first.log + again.log)
-        return follow_softened(model, start, q)
+        return soften_and_follow(model, start, q)
 
     def _measure_energies(self) -> None:
         """Take the potential without interaction as the zero of U."""

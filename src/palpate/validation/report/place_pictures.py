@@ -26,7 +26,7 @@ def place_pictures(chapter: Chapter, key: str) -> list[Picture]:
     if test is None or not isinstance(model, Surrogate) or model.hand_energy.baseline.surface is None:
         return []
     learnt = chapter.learnt_from if chapter.learnt_from.shape[1] == test.X.shape[1] else test.X[:0]
-    field = next((f for f in model.fields.values() if isinstance(f, FieldSurrogate)), None)
+    field = next(iter(model.surface_fields.values()), None)
     told = f"{count(len(test.X), 'unseen solve')}"
     if len(learnt):
         told = f"{count(len(learnt), 'solve')} to learn from and {told}"

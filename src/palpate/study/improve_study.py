@@ -101,7 +101,7 @@ def conclude(study: Study, paths: Paths, step: ImprovementStep) -> Outcome:
     validation = validate_study(study, step.surrogate, test, step.history, load_finer(study, paths))
     surrogate = step.surrogate
     origin = surrogate.meta.get("dataset", {})
-    if step.phase != "solved" and isinstance(train, Dataset) and origin.get("hash") != train.hash:
+    if step.phase != "solved" and origin.get("hash") != train.hash:
         # a surrogate of all solves was learnt, and was worse; this one of fewer has not seen the unseen ones either
         surrogate = replace(
             surrogate, meta={**surrogate.meta, "dataset": {**origin, "no_better": train.hash}}

@@ -1,49 +1,52 @@
-"""Stages of a study of a body with memory: load histories to learn from, and learning from them."""
+"""Stages of a study of a body with memory: load histories to learn from, and those that judge."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from palpate.learning.plastic import LoadHistories, learn_with_memory, solve_elastic, solve_histories
+from palpate.dataset import Dataset
+from palpate.dataset.histories import elastic_of, histories_of, history_dataset, is_history
 from palpate.physics import Cantilever, LinearElastic, TipLoad
 from palpate.physics.materials.plastic import Plastic
 from palpate.physics.materials.viscous import Viscoelastic
 from palpate.study.interaction_records import LoadRecord, LoadsRecord
 from palpate.study.study import Study
+from palpate.sweeps import solve_histories
+from palpate.sweeps.solve_histories import solve_elastic
 
-__all__ = ["learn_histories", "sweep_histories"]
+__all__ = ["sweep_histories", "with_elastic"]
 
 TEST_SEED = 1000  # distance of the seeds for testing from those of the histories to learn from
-BEYOND = 1.05  # reach of the elastic body over that of the learnt histories, for those that go farther
 
 
-def sweep_histories(study: Study, problem: Any) -> tuple[LoadHistories, LoadHistories]:
+def sweep_histories(study: Study, problem: Any) -> tuple[Dataset, Dataset]:
     """Return histories to learn from, drawn to the ends of the load, and even ones for testing."""
     assert study.memory is not None
-    load, creeps = _load_of(study), isinstance(study.body.build().material, Viscoelastic)
-    common: dict[str, Any] = {
-        "low": load.low,
-        "high": load.high,
-        "relaxes": creeps,
-        "step": study.memory.step,
-    }
+    creeps = isinstance(study.body.build().material, Viscoelastic)
+    common: dict[str, Any] = {"relaxes": creeps, "step": study.memory.step}
     seed = study.memory.seed
-    train = solve_histories(problem, count=study.memory.histories, seed=seed, **common)
+    train = solve_histories(
+        problem, elastic=_elastic_problem(study), count=study.memory.histories, seed=seed, **common
+    )
     test = solve_histories(problem, count=study.memory.unseen, seed=seed + TEST_SEED, outward=0.0, **common)
     return train, test
 
 
-def learn_histories(study: Study, train: LoadHistories) -> tuple[Any, Any]:
-    """Learn a body with memory; the same body without its memory is solved here."""
-    body: Any = study.body.build()
+def with_elastic(study: Study, train: Dataset) -> Dataset:
+    """Return histories with that of the body without its memory, which files of an earlier version lack; else as is."""
+    if not is_history(train) or elastic_of(train) is not None:
+        return train
+    problem, paths = study.problem(), histories_of(train)
+    same = solve_elastic(_elastic_problem(study), paths)
+    return history_dataset(paths, train.ranges[0], problem.layout, train.provenance, elastic=same)
+
+
+def _elastic_problem(study: Study) -> Any:
+    """Return the body without its memory under its load, from nothing."""
     load = _load_of(study)
-    elastic = _elastic(body).problem(TipLoad(0.0, load.high, direction=load.direction, name=load.name))
-    reach = BEYOND * max(float(np.abs(path.place).max()) for path in train.paths)
-    same = solve_elastic(elastic, reach=reach, load=load.high)
-    return learn_with_memory(train, same, relaxes=isinstance(body.material, Viscoelastic), name=study.name)
+    body: Any = study.body.build()
+    return _elastic(body).problem(TipLoad(0.0, load.high, direction=load.direction, name=load.name))
 
 
 def _load_of(study: Study) -> LoadRecord:

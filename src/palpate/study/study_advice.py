@@ -8,7 +8,7 @@ from typing import Any
 
 from palpate.dataset import Dataset
 from palpate.errors import PalpateError
-from palpate.study.run import Paths, Rows
+from palpate.study.run import Paths
 from palpate.study.stage_records import PadSweepRecord, ProbeSweepRecord
 from palpate.study.study import Study
 from palpate.surrogates import Surrogate
@@ -29,10 +29,10 @@ def earlier_curve(paths: Paths, name: str) -> Sequence[Mapping[str, Any]]:
     return tuple(meta.get("learning_curve", ())) if meta.get("name") == name else ()
 
 
-def advice_after(study: Study, model: Any, train: Rows, validation: Validation, file: Path) -> str:
+def advice_after(study: Study, model: Any, train: Dataset, validation: Validation, file: Path) -> str:
     """Return a sentence on how many solves would keep the limits; empty where more solves can't be added or help."""
     grows = isinstance(study.sweep, ProbeSweepRecord | PadSweepRecord)
-    if not grows or not isinstance(train, Dataset):
+    if not grows:
         return ""
     curve = getattr(model, "meta", {}).get("learning_curve", ())
     return advice_on_solves(validation, len(train), curve, f"palpate sweep {file} --samples")

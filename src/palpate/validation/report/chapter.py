@@ -29,11 +29,11 @@ class Chapter:
         Its heading.
     model : Surrogate
         What was learnt.
-    test : Dataset, TouchSolves or load histories
+    test : Dataset or TouchSolves
         Solves that were not learnt from.
     validation : Validation
         Of `model` on `test`.
-    train : Dataset or load histories, optional
+    train : Dataset, optional
         Solves that were learnt from.
     history : LearningHistory or History, optional
         What `palpate.learn` returned beside the model, or the record of a sequential filter alone.
@@ -91,7 +91,7 @@ class Chapter:
     def learnt_from(self) -> np.ndarray:
         """Inputs (N, n) of the solves that were learnt from, as far as they are known: their number is the one told."""
         X = getattr(getattr(self.train, "ok", self.train), "X", None)
-        if X is None or np.ndim(X) != 2 or not len(X):
+        if X is None or np.ndim(X) != 2 or not len(X) or self.subject.histories is not None:
             return np.zeros((0, 0))
         if self.subject.solves is None or np.shape(X)[1] != self.subject.solves.X.shape[1]:
             return np.asarray(X)

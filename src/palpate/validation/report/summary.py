@@ -14,7 +14,6 @@ from palpate.validation.figures.history_following import HistoryErrors
 from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
 from palpate.validation.report.body_words import body_words, solid_words, strain_words
 from palpate.validation.report.chapter import Chapter
-from palpate.validation.subject import line_of
 from palpate.validation.validate import Validation
 
 __all__ = ["Fact", "Story", "felt", "story"]
@@ -111,7 +110,7 @@ def _facts(chapter: Chapter) -> Iterator[Fact]:
     v, subject = chapter.validation, chapter.subject
     for one in v.answers or ():
         yield Fact(share(one.p95), f"error of {one.name} over its range, for 95 of 100 values")
-    if (line := line_of(chapter.model)) is not None:
+    if (line := getattr(chapter.model, "line", None)) is not None:
         ends = chapter.model.energy.inputs[: len(line.touched)]
         reach = math.hypot(*(max(abs(r.low), abs(r.high)) for r in ends))
         yield Fact(length(reach), "farthest trained displacement of the held node")

@@ -79,6 +79,13 @@ def _surrogate(file: Path) -> Surrogate:
     return load_surrogate(file)
 
 
+def _body(file: Path) -> Surrogate:
+    """Return the surrogate of a file that a hand feels."""
+    thing = _surrogate(file)
+    _ = thing.hand_energy  # which refuses one without touch
+    return thing
+
+
 def _say_left_out(console: Console, thing: Surrogate, *, no_field: bool) -> None:
     """Say that the shape of a beam did not go out, and why."""
     if thing.line is not None and not no_field:

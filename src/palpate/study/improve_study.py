@@ -15,6 +15,7 @@ from palpate.improvement import ImprovementStep, improve
 from palpate.improvement.improve import Interest
 from palpate.options import ImprovementOptions, takes
 from palpate.study.mesh_check import load_finer, mesh_part, solve_finer
+from palpate.study.probe_kind import ProbeSweepRecord
 from palpate.study.run import (
     Log,
     Outcome,
@@ -26,7 +27,6 @@ from palpate.study.run import (
     validate_study,
     with_validation,
 )
-from palpate.study.stage_records import ProbeSweepRecord
 from palpate.study.study import Study
 from palpate.study.study_advice import earlier_curve
 from palpate.sweeps import local_cluster

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -24,10 +24,10 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning import History, Settings, founding, learn_dataset, node_outputs
 from palpate.learning import learn as learn_samples
-from palpate.learning.learn_dataset import filter_record
+from palpate.learning.learn_dataset import LearningHistory, filter_record
 from palpate.learning.loading import load_histories
 from palpate.processes import CASE_LIMIT
-from palpate.study.memory_stages import sweep_histories, with_elastic
+from palpate.study.memory_kind import sweep_histories, with_elastic
 from palpate.study.mesh_check import load_finer, solve_finer
 from palpate.study.relaxation_stage import with_relaxation
 from palpate.study.study import Study
@@ -55,6 +55,8 @@ __all__ = [
 ]
 
 Log = Callable[[str], None]
+Record: TypeAlias = LearningHistory | History
+"""Record of learning: all of it, or that of the sequential filter, which a file keeps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +64,11 @@ class Outcome:
     """Result of a study that was carried out."""
 
     study: Study
-    model: Any  # with its errors on unseen solves written into it
+    model: Surrogate  # with its errors on unseen solves written into it
     train: Dataset  # solves that were learnt from
     test: Dataset  # solves that were not
     validation: Validation  # figures of the surrogate on the unseen solves
-    history: Any = None  # record of learning
+    history: Record | None = None  # record of learning
     # the founding form of the filter beside ours, by name, for studies with one input
     rivals: Mapping[str, Any] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)  # duration of each stage in s
@@ -212,7 +214,7 @@ def learn_study(
     watch: Any = None,
     leave_out: Sequence[int] = (),
     on_step: Log = lambda _: None,
-) -> tuple[Any, Any]:
+) -> tuple[Surrogate, LearningHistory]:
     """Learn the study's surrogate, which keeps the study's runtime settings.
 
     Rows of `test` are only watched while a filter learns; `progress` counts its observations, and `watch` (a
@@ -239,7 +241,7 @@ def learn_study(
     return _with_meta(model, {"runtime": study.runtime.model_dump()}), history
 
 
-def _options(study: Study, train: Dataset, test: Any, progress: Any, log: Log) -> dict[str, Any]:
+def _options(study: Study, train: Dataset, test: Dataset | None, progress: Any, log: Log) -> dict[str, Any]:
     """Return the options of `palpate.learn` for a study."""
     options: dict[str, Any] = {"name": study.name, **(study.learning.options() if study.learning else {})}
     if study.filter:
@@ -252,13 +254,13 @@ def _options(study: Study, train: Dataset, test: Any, progress: Any, log: Log) -
     return {**options, "log": log}
 
 
-def _with_meta(model: Any, more: Mapping[str, Any]) -> Any:
+def _with_meta(model: Surrogate, more: Mapping[str, Any]) -> Surrogate:
     """Return what was learnt with more said of it, for whoever opens the file later."""
     return replace(model, meta={**model.meta, **more})
 
 
 def validate_study(
-    study: Study, model: Any, test: Dataset, history: Any = None, finer: Dataset | None = None
+    study: Study, model: Surrogate, test: Dataset, history: Record | None = None, finer: Dataset | None = None
 ) -> Validation:
     """Judge what was learnt by solves that it has never seen, by the study's targets.
 
@@ -269,8 +271,8 @@ def validate_study(
 
 
 def with_validation(
-    model: Any, validation: Validation, curve: Sequence[Mapping[str, Any]] = (), solves: int = 0
-) -> Any:
+    model: Surrogate, validation: Validation, curve: Sequence[Mapping[str, Any]] = (), solves: int = 0
+) -> Surrogate:
     """Return what was learnt with its errors on unseen solves written into it.
 
     `curve` is the learning curve of the surrogate that it replaces; `solves` is the number that it was learnt from,
@@ -282,14 +284,14 @@ def with_validation(
     return _with_meta(model, more)
 
 
-def save_model(paths: Paths, model: Any, history: Any) -> None:
+def save_model(paths: Paths, model: Surrogate, history: Record | None) -> None:
     """Write what was learnt, and the record of its filter where there is one."""
     model.save(paths.model)
     if (own := filter_record(history)) is not None:
         own.save(paths.history)
 
 
-def load_model(paths: Paths, train: Dataset) -> tuple[Any, Any]:
+def load_model(paths: Paths, train: Dataset) -> tuple[Surrogate, History | None]:
     """Read what was learnt, and the record of its filter where there is one.
 
     It was learnt from just these rows, or from the first of them where all of them gave no better one: then the
@@ -362,7 +364,7 @@ def carry_out(
     return Outcome(study, model, train, test, validation, history, others, timings)
 
 
-def _rivals(study: Study, train: Any, test: Any, passes: int) -> dict[str, History]:
+def _rivals(study: Study, train: Dataset, test: Dataset, passes: int) -> dict[str, History]:
     """Return runs of the founding form and ours, as they are and ten times tighter, for studies of one input."""
     if len(train.ranges) != 1 or study.filter is None:
         return {}

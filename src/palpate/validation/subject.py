@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -57,8 +56,8 @@ class Subject:
     @classmethod
     def of(
         cls,
-        model: Any,
-        test: Any,
+        model: Surrogate | TouchFunction,
+        test: Dataset | TouchSolves,
         *,
         history: History | LearningHistory | None = None,
         refined: Dataset | TouchSolves | None = None,
@@ -91,15 +90,15 @@ class Subject:
         return _by_place(model, surrogate, test, refined, strokes, seed)
 
 
-def _required(test: Any, name: str) -> Dataset:
+def _required(test: Dataset | TouchSolves, name: str) -> Dataset:
     """Return the dataset that judges a surrogate; an error for anything else."""
-    data = test if hasattr(test, "provenance") else getattr(test, "data", None)
+    data: Dataset | None = test if hasattr(test, "provenance") else getattr(test, "data", None)
     if data is None:
         raise UsageError(
             f"{name} is judged by a dataset, not by {type(test).__name__} {test!r:.60}.",
             fix="Give what `palpate.sweep` or `palpate.import_results` returned, or `Dataset.open(path)`.",
         )
-    return data  # type: ignore[no-any-return]
+    return data
 
 
 def _by_answers(model: Surrogate, test: Dataset) -> Subject:
@@ -178,7 +177,7 @@ def _by_place(
     )
 
 
-def _solves(test: Any, function: TouchFunction, energy: LearntEnergy | None) -> TouchSolves:
+def _solves(test: Dataset | TouchSolves, function: TouchFunction, energy: LearntEnergy | None) -> TouchSolves:
     """Return solves of a function's body and of its probe; an error for anything else."""
     if not hasattr(test, "take"):
         raise UsageError(

@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from palpate.dataset import Dataset
 from palpate.learning import History
-from palpate.learning.learn_dataset import filter_record
+from palpate.learning.learn_dataset import LearningHistory, filter_record
+from palpate.surrogates import Surrogate
 from palpate.validation.figures.history_following import Followed, follow_unseen
 from palpate.validation.subject import Subject
 from palpate.validation.touch_comparison import TouchComparison
+from palpate.validation.unseen_solves import TouchFunction, TouchSolves
 from palpate.validation.validate import Validation
 
 __all__ = ["Chapter"]
@@ -52,17 +55,22 @@ class Chapter:
     """
 
     name: str
-    model: Any
-    test: Any
+    model: Surrogate | TouchFunction
+    test: Dataset | TouchSolves
     validation: Validation
-    train: Any = None
-    history: Any = None
+    train: Dataset | None = None
+    history: LearningHistory | History | None = None
     rivals: Mapping[str, Any] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     comparisons: Sequence[TouchComparison] = ()
     advice: str = ""
+
+    @property
+    def surrogate(self) -> Surrogate | None:
+        """The model, where it is a surrogate and no function of a place alone."""
+        return self.model if isinstance(self.model, Surrogate) else None
 
     @property
     def filter(self) -> History | None:
@@ -95,7 +103,8 @@ class Chapter:
             return np.zeros((0, 0))
         if self.subject.solves is None or np.shape(X)[1] != self.subject.solves.X.shape[1]:
             return np.asarray(X)
-        touching = np.asarray(X)[self.model.energy.baseline.coordinate(np.asarray(X)) > 0]
+        assert self.surrogate is not None
+        touching = np.asarray(X)[self.surrogate.hand_energy.baseline.coordinate(np.asarray(X)) > 0]
         # later ones may have made no better surrogate
         return np.asarray(touching[: int(self.meta.get("solves", len(touching)))])
 

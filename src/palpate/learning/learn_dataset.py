@@ -88,7 +88,8 @@ class LearningHistory:
             ]
             return "\n  ".join([*lines, *map(str, self.fields.values())])
         tried = len(self.energy.trials)
-        words = f"{self.solves} solves, {tried} networks of the energy tried in {self.seconds:.0f} s"
+        noun = "solves" if self.memory is None else "samples of histories"
+        words = f"{self.solves} {noun}, {tried} networks of the energy tried in {self.seconds:.0f} s"
         left = self.energy.meta.get("left_out", {})
         if left:
             words += (
@@ -190,7 +191,7 @@ def learn(
     if known is None:
         _refuse_options(further)
         return _learn_answers(train, name, options, log)
-    log(f"learning the energy of {count(solves, 'solve')}")
+    log(f"learning the energy of {train.size_in_words}")
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
 
     def limit(share: float) -> float | None:

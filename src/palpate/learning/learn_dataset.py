@@ -16,7 +16,7 @@ import numpy as np
 from palpate import checks
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
-from palpate.format import count, share
+from palpate.format import share
 from palpate.learning import bent_body, pad_solves, plastic, pressed_solves  # noqa: F401  # which enter the kinds that they recognise
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted

@@ -171,7 +171,7 @@ def test_joined_networks_answer_what_the_parts_do():
     wanted = np.hstack([surrogate.predict(X), field, surrogate.fields["rise"].values(X)[:, :, 0]])
     np.testing.assert_allclose(answers.predict(X), wanted, atol=1e-12 * np.abs(wanted).max())
     assert len(answers.networks) == 3
-    assert answers_of(surrogate.quantities["gaussian"].network).networks[0].units == 11
+    assert answers_of(Surrogate.of(surrogate.quantities["gaussian"].network)).networks[0].units == 11
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import exported_bodies
+import palpate as pp
 from answering import answering
 from palpate.cli import main
 from palpate.errors import ResourceError, StudyError, UsageError
@@ -92,7 +93,7 @@ def test_the_clients_answers_are_those_of_the_body_with_its_slopes(umbridge, tou
 def test_slopes_are_those_of_the_values(umbridge):
     """A network, by central differences of what is served."""
     network = exported_bodies.random_network((Range("a", 0, 1, "m"), Range("b", -1, 1, "N")), seed=3)
-    with serving(served_models(network)) as server:
+    with serving(served_models(pp.Surrogate.of(network))) as server:
         model = umbridge.HTTPModel(server.url, "outputs")
         x, m = np.array([0.4, 0.2]), model.get_output_sizes()[0]
         sens, vec, step = np.linspace(1, 2, m), np.array([0.7, -0.4]), 1e-5

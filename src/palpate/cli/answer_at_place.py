@@ -236,7 +236,7 @@ def surrogate_answers(surrogate: Surrogate, X: np.ndarray) -> list[Answers]:
     """Return the numbers and fields of a surrogate at inputs X (N, n)."""
     spread, trusted = surrogate.deviation(X), surrogate.trusted(X)
     spread = np.where(outside(X, surrogate.inputs).any(axis=1, keepdims=True), math.nan, spread)
-    fields = [shown for shown in surrogate.fields.values() if isinstance(shown, ModalField)]
+    fields = surrogate.modal_fields.values()
     rows = zip(X, surrogate.predict(X), spread, trusted, strict=True)
     return [
         Answers(

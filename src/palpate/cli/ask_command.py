@@ -17,7 +17,6 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning import Fitted
 from palpate.learning.loading import load
-from palpate.learning.plastic.load_histories import LoadHistories
 from palpate.network import Network
 from palpate.number_text import number_list
 from palpate.runtime.touchable import touchable
@@ -33,7 +32,7 @@ _NOUNS = {
     "Surrogate": "A learnt body",
     "Fitted": "A network of data, with intervals",
     "Network": "A network of data",
-    "LoadHistories": "Load histories",
+    "Dataset": "Load histories",
 }
 
 
@@ -86,10 +85,8 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
 
 def _line_under_loads(contents: Any) -> NodeField | None:
     """Return the displacement of a beam that answers to its loads alone; None of anything else."""
-    shown = contents.fields.get("displacement") if isinstance(contents, Surrogate) else None
-    if isinstance(shown, NodeField) and shown.asked_by == "load" and contents.memory is None:
-        return shown
-    return None
+    shown = getattr(contents, "line", None)
+    return shown if shown is not None and shown.asked_by == "load" and contents.memory is None else None
 
 
 def deflections(line: NodeField, X: np.ndarray) -> list[Deflection]:
@@ -100,9 +97,7 @@ def deflections(line: NodeField, X: np.ndarray) -> list[Deflection]:
 
 def inputs_of(asked: Any) -> tuple[Range, ...]:
     """Return the ranges of the n inputs; none of histories."""
-    if isinstance(asked, LoadHistories):
-        return ()
-    return tuple(asked.network.inputs if isinstance(asked, Fitted) else asked.inputs)
+    return tuple(getattr(getattr(asked, "network", asked), "inputs", ()))
 
 
 def answers_at(body: Surrogate, X: np.ndarray) -> list[Answer]:

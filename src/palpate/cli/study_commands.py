@@ -54,7 +54,6 @@ def sweep_file(
     The workers are by default those of the study; a single solve has failed after `case_limit` seconds. `samples` go in
     place of the study's own number; a finished sweep is continued.
     """
-    from palpate.dataset import Dataset
     from palpate.study import read_study
     from palpate.study.run import Paths, sweep_study
     from palpate.study.study_lock import hold_study
@@ -84,18 +83,15 @@ def sweep_file(
             case_limit=case_limit,
             log=lambda stage: console.say(f"Solving: {stage} …"),
         )
-    target, other = (
-        (paths.data, paths.random) if record.memory is None else (paths.histories, paths.unseen_histories)
-    )
+    target, other = paths.data, paths.random
     parts = [data] if further is None else [data, further]
-    failed = sum(len(part) - len(part.ok) for part in parts if hasattr(part, "ok"))
-    what = "solves" if record.memory is None else "histories"
+    failed = sum(len(part) - len(part.ok) for part in parts)
     failures = f", {failed} did not converge" if failed else ""
     lines = [str(data)] if console.verbose else []
-    lines.append(f"{target}: {len(data)} {what} to learn from{failures}")
+    lines.append(f"{target}: {data.size_in_words} to learn from{failures}")
     if further is not None:
-        lines.append(f"{other}: {len(further)} further {what} for testing")
-    seconds = [float(s) for part in parts if isinstance(part, Dataset) for s in part["solve_seconds"]]
+        lines.append(f"{other}: {further.size_in_words} for testing")
+    seconds = [float(s) for part in parts for s in part["solve_seconds"]]
     if seconds:
         lines.append(
             f"{count(len(seconds), 'solve')}, {duration(statistics.median(seconds))} each at the median; "
@@ -152,7 +148,7 @@ def learn_file(study: Path, console: Console, *, watch: bool = False, leave_out:
     page = paths.folder / f"{record.name}.growth.html" if watch else None
     with hold_study(paths, "palpate learn"):
         train, test = load_data(record, paths)
-        console.say(f"Learning from {len(train)} {'solves' if record.memory is None else 'histories'} …")
+        console.say(f"Learning from {train.size_in_words} …")
         with watch_growth(page, record.name, console) as recorder, console.patience("Learning"):
             model, history = learn_study(
                 record,
@@ -314,7 +310,7 @@ def validate_model(
 def _test_set(path: Path, test: Path | None) -> Any:
     """Return the dataset, or for a body with memory the load histories, that lies beside a model or was named."""
     from palpate.dataset import Dataset
-    from palpate.learning.plastic import LoadHistories
+    from palpate.learning.loading import load_histories
 
     beside = [path.with_name(path.stem + end) for end in TEST_SETS]
     found = test or next((file for file in beside if file.exists()), None)
@@ -324,4 +320,4 @@ def _test_set(path: Path, test: Path | None) -> Any:
             why=f"None of {', '.join(file.name for file in beside)} lies beside it.",
             fix="Name a dataset of solves that it was not learnt from: --test DATA.zarr",
         )
-    return LoadHistories.load(found) if found.suffix == ".palpate" else Dataset.open(found)
+    return load_histories(found) if found.suffix == ".palpate" else Dataset.open(found)

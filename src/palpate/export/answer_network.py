@@ -125,23 +125,21 @@ class _Rows:
     matrix: np.ndarray
 
 
-def answers_of(thing: Surrogate | Network) -> AnswerNetwork | None:
-    """Return what a network, or a surrogate that no hand feels, answers as a whole; None of a touched body."""
-    if isinstance(thing, Network):
-        return AnswerNetwork("network", (thing,), (), (), (len(thing.outputs),))
-    return None if thing.can_be_touched else whole_answers(thing)
+def answers_of(surrogate: Surrogate) -> AnswerNetwork | None:
+    """Return what a surrogate that no hand feels answers as a whole; None of a touched body."""
+    return None if surrogate.can_be_touched else whole_answers(surrogate)
 
 
 def whole_answers(surrogate: Surrogate) -> AnswerNetwork:
     """Return all numbers, and all values of all fields and curves; an error where there are none."""
     rows = [*_numbers(surrogate)]
-    rows += [_values(shown, range(len(shown.places))) for shown in _modal_fields(surrogate)]
+    rows += [_values(shown, range(len(shown.places))) for shown in surrogate.modal_fields.values()]
     return _assemble(surrogate, rows, ())
 
 
 def answer_network(surrogate: Surrogate, choice: Choice) -> AnswerNetwork:
     """Return all numbers and curves, and the chosen values of fields; an error where a field or place is not there."""
-    fields = {shown.name: shown for shown in _modal_fields(surrogate)}
+    fields = {shown.name: shown for shown in surrogate.modal_fields.values()}
     flat = {name: shown for name, shown in fields.items() if not shown.is_curve}
     _require_fields(surrogate, flat, choice)
     means = tuple(flat) if choice.is_default else choice.means
@@ -171,10 +169,6 @@ def _assemble(
     networks = _join([*rows, *hidden])
     groups = tuple(len(row.outputs) for row in rows)
     return AnswerNetwork(surrogate.name, networks, runs, _regions([*rows, *hidden]), groups)
-
-
-def _modal_fields(surrogate: Surrogate) -> list[ModalField]:
-    return [shown for shown in surrogate.fields.values() if isinstance(shown, ModalField)]
 
 
 def _require_fields(surrogate: Surrogate, flat: dict[str, ModalField], choice: Choice) -> None:

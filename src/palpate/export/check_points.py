@@ -248,9 +248,7 @@ def compare_body(
     if surrogate.memory is not None:
         parts |= _stroke(surrogate, asker, precision)
     if field:
-        shown = surrogate.fields[field]
-        assert isinstance(shown, FieldSurrogate)
-        parts["field"] = compare_field(surrogate, shown, asker, precision)
+        parts["field"] = compare_field(surrogate, surrogate.surface_fields[field], asker, precision)
     return Comparison(parts, precision.single)
 
 

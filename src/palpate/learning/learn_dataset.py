@@ -17,13 +17,14 @@ from palpate import checks
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
 from palpate.format import count, share
-from palpate.learning import bent_body, pad_solves, pressed_solves  # noqa: F401  # which enter the kinds that they recognise
+from palpate.learning import bent_body, pad_solves, plastic, pressed_solves  # noqa: F401  # which enter the kinds that they recognise
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.dataset_answers import DatasetAnswers
 from palpate.learning.energy import EnergyHistory, SuspectSolve, learn_energy
 from palpate.learning.fields import LearntField, LearntModes, learn_modes
 from palpate.learning.learning_history import History
+from palpate.learning.plastic import MemoryFit
 from palpate.learning.recognised import Request, recognise
 from palpate.learning.search import Budget
 from palpate.options import FieldOptions, FitOptions, SearchOptions, takes
@@ -60,6 +61,8 @@ class LearningHistory:
         How long it took, s.
     filter : History, optional
         Record of the sequential filter, of a body that loads bend.
+    memory : MemoryFit, optional
+        How well the memory of a body fits the histories.
     """
 
     energy: EnergyHistory | None
@@ -69,6 +72,7 @@ class LearningHistory:
     filter: History | None = None
     quantities: Mapping[str, Fitted] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    memory: MemoryFit | None = None
 
     @property
     def suspects(self) -> tuple[SuspectSolve, ...]:
@@ -99,7 +103,8 @@ class LearningHistory:
                 f"{1e3 * missed:.2g} mm" if learnt.field.unit == "m" else f"{missed:.2g} {learnt.field.unit}"
             )
             words += f"; {_SHOWN[name][0]}: {learnt.field.meta['modes']} modes, which miss {size}"
-        return "\n".join([words, *suspect_sentences(self.suspects)])
+        memory = [] if self.memory is None else [str(self.memory)]
+        return "\n".join([words, *memory, *suspect_sentences(self.suspects)])
 
     __repr__ = __str__
 
@@ -181,9 +186,7 @@ def learn(
     numbers, excluded = _kept_rows(train, leave_out)
     train, solves = train.take(numbers), len(numbers)
     origin = {"hash": train.ok.hash, "provenance": train.provenance}
-    if "input_node" in train:  # a body that loads bend
-        log(f"displacements of {count(solves, 'solve')}")
-    known = recognise(train, Request(options, layout, further))
+    known = recognise(train, Request(options, layout, further, log))
     if known is None:
         _refuse_options(further)
         return _learn_answers(train, name, options, log)
@@ -215,9 +218,12 @@ def learn(
         meta["suspects"] = [vars(one) for one in found.suspects]
     if excluded:
         meta["excluded"] = excluded
-    surrogate = Surrogate(energy, {**known.fields, **{k: v.field for k, v in learnt.items()}}, meta=meta)
+    memory, fit = (None, None) if known.memory is None else known.memory(energy)
+    if memory is not None:
+        del meta["solves"]  # a history is none
+    surrogate = Surrogate(energy, {**known.fields, **{k: v.field for k, v in learnt.items()}}, memory, meta)
     spent = time.monotonic() - began
-    return surrogate, LearningHistory(found, solves, spent, learnt, known.filter)
+    return surrogate, LearningHistory(found, solves, spent, learnt, known.filter, memory=fit)
 
 
 def _kept_rows(train: Dataset, leave_out: Sequence[int]) -> tuple[np.ndarray, list[int]]:

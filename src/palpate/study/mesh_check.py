@@ -17,7 +17,8 @@ from palpate.files import restore_folder, write_file
 from palpate.format import count, millimetres, share
 from palpate.physics.solid.finer_problem import FINER, finer_problem
 from palpate.processes import CASE_LIMIT
-from palpate.study.stage_records import ProbeSweepRecord, ProbeTestRecord, TouchTargetRecord
+from palpate.study.probe_kind import ProbeSweepRecord, ProbeTestRecord
+from palpate.study.stage_records import TouchTargetRecord
 from palpate.study.study import Study
 from palpate.study.study_paths import Paths
 from palpate.sweeps import sweep

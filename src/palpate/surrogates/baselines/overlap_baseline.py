@@ -22,6 +22,7 @@ from palpate.errors import UsageError
 from palpate.kernels import part
 from palpate.surrogates.baselines.baseline import register_baseline
 from palpate.surrogates.baselines.contact_baseline import ContactBaseline, leave_contact
+from palpate.surrogates.baselines.graph_form import BaselineForm, Graph, Touch, Value
 from palpate.surrogates.contact_law import law_at
 from palpate.surrogates.continuation import saturated
 from palpate.surrogates.energy_kernels import (
@@ -130,6 +131,21 @@ class OverlapBaseline(ContactBaseline):
         return Compiled(
             None, (numbers, surface, self.pressed.compiled()), enter=_enter_overlap, leave=_leave_overlap
         )
+
+    def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
+        """Return the contact law at the equivalent depth of the overlap."""
+        assert touch is not None  # it has a surface
+        e, slope, bend = touch.distance_to(self.pressed)(place)
+        measured = self.radius - e
+        depth = measured
+        ends = (SMALLEST, measured < touch.depth * SMALLEST), (LARGEST, measured > touch.depth * LARGEST)
+        for factor, off in ends:
+            depth, slope = (
+                graph.where(off, touch.depth * factor, depth),
+                graph.where(off, touch.normal * factor, slope),
+            )
+            bend = graph.where(off.spread(2), touch.bend * factor, bend)
+        return self._law_form(graph, graph.where(touch.contact, depth, 1.0), slope, bend)
 
     def c_source(self) -> str:
         """Return the kernels in C99, those of a contact before them."""

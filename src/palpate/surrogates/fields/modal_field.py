@@ -11,27 +11,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.format import count, plain
-from palpate.network import Network
+from palpate.network import Network, TrainedRegion
+from palpate.network.kinds import register_kind
 from palpate.network.network_kernels import Precision
+from palpate.surrogates.fields.field import Field
 from palpate.surrogates.fields.places import AxisPlaces, MeshPlaces
 from palpate.surrogates.learnt_quantities import LearntQuantities
-from palpate.units import Range
-
-if TYPE_CHECKING:
-    from palpate.surrogates.energy import LearntEnergy
 
 __all__ = ["ModalEvaluator", "ModalField"]
 
 
-@dataclass(frozen=True, eq=False)
-class ModalField:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalField(Field):
     """A field at P places with C components each, as a value, kept in the file of its surrogate.
 
     Attributes
@@ -63,6 +61,8 @@ class ModalField:
         If the parts do not fit together.
     """
 
+    carrier: ClassVar[Literal["places"]] = "places"
+
     name: str
     unit: str
     places: MeshPlaces | AxisPlaces
@@ -91,27 +91,30 @@ class ModalField:
         unit = f" ({self.unit})" * bool(self.unit)
         return f"field {self.name}{unit} at {self.places}: {count(len(self.modes), 'mode')}{words}"
 
-    __repr__ = __str__
-
     @property
-    def network(self) -> Network:
+    def network(self) -> Network:  # type: ignore[override]
         """The network of the coefficients."""
         return self.coefficients.network
 
     @property
-    def inputs(self) -> tuple[Range, ...]:
-        """Names, units and trained ranges of the n inputs."""
-        return self.coefficients.inputs
+    def region(self) -> TrainedRegion | None:
+        """The trained region of the coefficients."""
+        return self.coefficients.region
 
     @property
-    def is_curve(self) -> bool:
+    def is_curve(self) -> bool:  # type: ignore[override]
         """True where its places are points of an axis."""
-        return isinstance(self.places, AxisPlaces)
+        return self.axis is not None
 
-    def fault_beside(self, energy: LearntEnergy) -> str:
-        """Return what does not fit the energy of the same body; "" if all does."""
-        names = [(r.name, r.unit) for r in self.inputs]
-        return "" if names == [(r.name, r.unit) for r in energy.inputs] else "it has other inputs"
+    @property
+    def axis(self) -> AxisPlaces | None:
+        """The axis of a curve; None of a field over a mesh."""
+        return self.places if isinstance(self.places, AxisPlaces) else None
+
+    @property
+    def mesh(self) -> MeshPlaces | None:
+        """The mesh of a field; None of a curve."""
+        return self.places if isinstance(self.places, MeshPlaces) else None
 
     def values(self, X: np.ndarray) -> np.ndarray:
         """Return the field (N, P, C) at inputs X (N, n).
@@ -154,6 +157,9 @@ class ModalField:
     def evaluator(self, *, precision: Precision = "single") -> ModalEvaluator:
         """Return the allocation-free evaluator of a picture's path."""
         return ModalEvaluator(self, precision)
+
+
+register_kind(Field, ModalField, "ModalField")
 
 
 class ModalEvaluator:

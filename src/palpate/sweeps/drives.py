@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-__all__ = ["held_loads", "load_unload_reload", "random_times", "random_turns"]
+__all__ = ["even_steps", "held_loads", "load_unload_reload", "random_times", "random_turns"]
 
 
 def random_turns(

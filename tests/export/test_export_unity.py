@@ -16,7 +16,8 @@ import exported_bodies
 import pressed
 from palpate.errors import UsageError
 from palpate.export.check_engine import CheckEngine, engine_library
-from palpate.export.unity_export import export_unity, press_ends
+from palpate.export.engine_scene import press_ends
+from palpate.export.unity_export import export_unity
 from system_programs import require_program
 
 STANDINS = Path(__file__).parent / "unity_standins.cs"
@@ -113,7 +114,10 @@ def test_the_sample_presses_and_warnings_say_what_does_not_fit(played):
 def test_a_sample_leads_its_tool_from_the_air_into_the_trained_body():
     for name in ("contact", "relaxation", "closed"):
         organ = exported_bodies.body(name)
-        away, deep = (np.append(end, [(r.low + r.high) / 2 for r in organ.parameters])[None] for end in press_ends(organ))
+        away, deep = (
+            np.append(end, [(r.low + r.high) / 2 for r in organ.parameters])[None]
+            for end in press_ends(organ)
+        )
         assert organ.energy.depth(away)[0] < 0.0 < organ.energy.depth(deep)[0]
         assert organ.energy.inside(deep)[0]
 
@@ -141,7 +145,9 @@ def test_the_mesh_is_outward_in_the_frame_of_unity(tmp_path):
     nodes, count = struct.unpack("<2i", data[:8])
     places = np.frombuffer(data[8 : 8 + 12 * nodes], "<f4").reshape(-1, 3)
     a, b, c = places[np.frombuffer(data[8 + 12 * nodes :], "<i4").reshape(count, 3)].transpose(1, 0, 2)
-    ours = np.cross(*(field.points[field.triangles[:, k]] - field.points[field.triangles[:, 0]] for k in (1, 2)))
+    ours = np.cross(
+        *(field.points[field.triangles[:, k]] - field.points[field.triangles[:, 0]] for k in (1, 2))
+    )
     np.testing.assert_allclose(np.cross(b - a, c - a)[:, [0, 2, 1]], ours, atol=1e-6 * np.abs(ours).max())
 
 

@@ -1,4 +1,4 @@
-"""A folder of files that belong together, as a package or a plugin: written whole, and replaced where nobody changed it."""
+"""A folder of files that belong together, as a package or a plugin, replaced where nobody changed it."""
 
 from __future__ import annotations
 
@@ -6,14 +6,44 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from palpate.errors import UsageError
+from palpate.export.check_points import Comparison
 from palpate.files import system_errors, write_file
 
-__all__ = ["write_package"]
+__all__ = ["ExportedPackage", "write_package"]
 
 _RECORD = ".palpate.json"  # engines leave names with a dot alone
+
+
+@dataclass(frozen=True)
+class ExportedPackage:
+    """A folder for an engine, and how far its library is from palpate.
+
+    Attributes
+    ----------
+    folder : Path
+        The package.
+    files : tuple of Path
+        All of its files.
+    hash : str
+        SHA-256 of the weights.
+    comparison : Comparison, optional
+        How far it is from palpate; None where nothing was to be compared, or nothing here runs it.
+    """
+
+    folder: Path
+    files: tuple[Path, ...]
+    hash: str
+    comparison: Comparison | None
+
+    def as_dict(self) -> dict[str, object]:
+        """Return what was written and compared, for JSON."""
+        compared = None if self.comparison is None else self.comparison.as_dict()
+        files = [{"file": str(f), "bytes": f.stat().st_size} for f in self.files]
+        return {"folder": str(self.folder), "files": files, "hash": self.hash, "compared": compared}
 
 
 def _hash(content: bytes) -> str:

@@ -1,7 +1,7 @@
 """Export as a package of Unity: a component, the mesh at rest, the weights, and a library for three systems.
 
-Nothing is compiled: the library was built beforehand and reads any body's weights (`fmu_binaries.engine_libraries`). Each
-file goes out with Unity's `.meta` file beside it, so that references to it hold when the package is exported again.
+Nothing is compiled: the library was built beforehand and reads any body's weights (`engine_libraries`). Each file
+goes out with Unity's `.meta` file beside it, so that references to it hold when the package is exported again.
 """
 
 from __future__ import annotations
@@ -11,24 +11,23 @@ import json
 import os
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from palpate.errors import UsageError
 from palpate.export.c_export import block_of
 from palpate.export.c_files import require_name
 from palpate.export.check_engine import CheckEngine, engine_library
 from palpate.export.check_points import Comparison, compare_body
 from palpate.export.core_source import fill_template
+from palpate.export.engine_scene import press_ends, probe_radius, require_touch, shown_mesh, tool_words
 from palpate.export.fmu_binaries import engine_libraries
-from palpate.export.package_folder import write_package
+from palpate.export.package_folder import ExportedPackage, write_package
 from palpate.export.weights_block import WeightsBlock, identifier
 from palpate.surrogates import FieldSurrogate, Surrogate
 from palpate.surrogates.model_card import card_of
 
-__all__ = ["ExportedPackage", "checked_block", "export_unity", "press_ends", "shown_mesh"]
+__all__ = ["export_unity"]
 
 _PLUGINS = {
     ".so": ("Linux64", "Linux", "x86_64"),
@@ -41,34 +40,6 @@ _IMPORTERS = {
     ".bytes": "TextScriptImporter",
     ".md": "TextScriptImporter",
 }
-
-
-@dataclass(frozen=True)
-class ExportedPackage:
-    """A folder for an engine, and how far its library is from palpate.
-
-    Attributes
-    ----------
-    folder : Path
-        The package.
-    files : tuple of Path
-        All of its files.
-    hash : str
-        SHA-256 of the weights.
-    comparison : Comparison, optional
-        How far it is from palpate; None where nothing was to be compared, or nothing here runs it.
-    """
-
-    folder: Path
-    files: tuple[Path, ...]
-    hash: str
-    comparison: Comparison | None
-
-    def as_dict(self) -> dict[str, object]:
-        """Return what was written and compared, for JSON."""
-        compared = None if self.comparison is None else self.comparison.as_dict()
-        files = [{"file": str(f), "bytes": f.stat().st_size} for f in self.files]
-        return {"folder": str(self.folder), "files": files, "hash": self.hash, "compared": compared}
 
 
 def export_unity(
@@ -103,22 +74,15 @@ def export_unity(
         If the library differs from palpate by more than it may; nothing is written.
     """
     name = require_name(identifier(surrogate.name) if name is None else name)
-    block, comparison = checked_block(surrogate, check=check)
+    block, comparison = _checked_block(surrogate, check=check)
     files = _package_files(surrogate, name, block)
     files |= {f"{path}.meta": _meta(name, path) for path in _with_folders(files)}
-    return ExportedPackage(
-        Path(out), write_package(out, files, overwrite=overwrite), block.hash, comparison
-    )
+    return ExportedPackage(Path(out), write_package(out, files, overwrite=overwrite), block.hash, comparison)
 
 
-def checked_block(surrogate: Surrogate, *, check: bool) -> tuple[WeightsBlock, Comparison | None]:
+def _checked_block(surrogate: Surrogate, *, check: bool) -> tuple[WeightsBlock, Comparison | None]:
     """Return a body's weights for an engine, and how far the generic library is from palpate with them."""
-    if not surrogate.can_be_touched:
-        raise UsageError(
-            f"The model {surrogate.name!r} can't be touched.",
-            why="A scene asks a body for the force on a tool.",
-            fix="Take it out with `palpate export fmu`, `lib`, `c` or `onnx`.",
-        )
+    require_touch(surrogate)
     mesh = shown_mesh(surrogate)
     block = block_of(
         surrogate, field=None if mesh is None else mesh.name, with_field=mesh is not None, deviation=False
@@ -136,41 +100,6 @@ def checked_block(surrogate: Surrogate, *, check: bool) -> tuple[WeightsBlock, C
     return block, comparison
 
 
-def shown_mesh(surrogate: Surrogate) -> FieldSurrogate | None:
-    """Return the displacement of a surface that an engine can draw, if the body has one."""
-    field = surrogate.fields.get("displacement")
-    drawn = isinstance(field, FieldSurrogate) and field.rest.shape[1] == 3
-    return field if drawn and isinstance(field, FieldSurrogate) else None
-
-
-def press_ends(surrogate: Surrogate) -> tuple[np.ndarray, np.ndarray]:
-    """Return two places (3,), m, between which a sample leads its tool: free, and in the trained body."""
-    energy = surrogate.hand_energy
-    k, D = len(energy.baseline.directions), energy.baseline.directions
-    middle = np.array([(r.low + r.high) / 2 for r in surrogate.inputs])
-    X = energy.trained_rows()
-    X[:, k:] = middle[k:]
-    if energy.baseline.holds:
-        size = np.linalg.norm(X[:, :k] * energy.inside(X)[:, None], axis=1)
-        return np.zeros(3), 0.7 * X[np.argmax(size), :k] @ D
-    depth = np.where(energy.inside(X), energy.depth(X), -np.inf)
-    row = np.argsort(depth)[-max(1, int(np.isfinite(depth).sum()) // 20)]
-    evaluate = energy.evaluator()
-    evaluate(X[row, :3], middle[3:])
-    return X[row, :3] + (depth[row] + _radius(surrogate)) * evaluate.outward, X[row, :3].copy()
-
-
-def _radius(surrogate: Surrogate) -> float:
-    """Return the radius of the ball, m: the middle one of several, 0 of a body that is held."""
-    baseline = surrogate.hand_energy.baseline
-    if baseline.holds:
-        return 0.0
-    if baseline.radius_input is None:
-        return float(baseline.radius)
-    own = surrogate.inputs[baseline.radius_input]
-    return (own.low + own.high) / 2
-
-
 def _vector(place: np.ndarray) -> str:
     return ", ".join(f"{v:.6g}f" for v in np.asarray(place)[[0, 2, 1]])
 
@@ -178,16 +107,14 @@ def _vector(place: np.ndarray) -> str:
 def _package_files(surrogate: Surrogate, name: str, block: WeightsBlock) -> dict[str, bytes]:
     """Return the files of the package by their relative names, without their meta files."""
     away, deep = press_ends(surrogate)
-    radius, holds = _radius(surrogate), surrogate.hand_energy.baseline.holds
-    own = f"It is a ball of {1e3 * radius:g} mm radius." if not holds else "The body is held where the tool starts."
     space = name[0].upper() + name[1:]
     words = {
         "@TITLE@": surrogate.name,
-        "@RADIUS@": f"{radius:.9g}",
-        "@HOLDS@": "true" if holds else "false",
+        "@RADIUS@": f"{probe_radius(surrogate):.9g}",
+        "@HOLDS@": "true" if surrogate.hand_energy.baseline.holds else "false",
         "@AWAY@": _vector(away),
         "@DEEP@": _vector(deep),
-        "@TOOL@": own,
+        "@TOOL@": tool_words(surrogate),
         "CLASS": space,
         "NAME": name,
     }
@@ -241,7 +168,7 @@ def _manifest(surrogate: Surrogate, name: str, space: str) -> dict[str, object]:
 def _mesh_bytes(mesh: FieldSurrogate) -> bytes:
     """Return points and triangles as LearntBody.cs reads them: counts, places and corners in Unity's frame."""
     places = np.asarray(mesh.points)[:, [0, 2, 1]].astype("<f4")
-    corners = np.asarray(mesh.triangles)[:, [0, 2, 1]].astype("<i4")  # the frame is mirrored, and with it what is outside
+    corners = np.asarray(mesh.triangles)[:, [0, 2, 1]].astype("<i4")  # as the frame is mirrored
     return struct.pack("<2i", len(places), len(corners)) + places.tobytes() + corners.tobytes()
 
 
@@ -258,10 +185,7 @@ def _meta(package: str, path: str) -> bytes:
     head = f"fileFormatVersion: 2\nguid: {identity}\n"
     if ending in _PLUGINS:
         return (head + _plugin_importer(*_PLUGINS[ending])).encode()
-    if path == "package.json":
-        kind = "PackageManifestImporter"
-    else:
-        kind = _IMPORTERS.get(ending, "DefaultImporter")
+    kind = "PackageManifestImporter" if path == "package.json" else _IMPORTERS.get(ending, "DefaultImporter")
     folder = "" if ending else "folderAsset: yes\n"
     version = "  serializedVersion: 2\n  defaultReferences: []\n" if kind == "MonoImporter" else ""
     return f"{head}{folder}{kind}:\n  externalObjects: {{}}\n{version}  userData: \n".encode()
@@ -281,6 +205,7 @@ def _plugin_importer(platform: str, system: str, processor: str) -> str:
     return (
         "PluginImporter:\n  externalObjects: {}\n  serializedVersion: 2\n  isPreloaded: 0\n  isOverridable: 0\n"
         "  isExplicitlyReferenced: 0\n  validateReferences: 1\n  platformData:\n"
-        f"  - first:\n      : Any\n    second:\n      enabled: 0\n      settings:\n        Exclude Editor: 0\n{excluded}"
+        "  - first:\n      : Any\n    second:\n      enabled: 0\n      settings:\n        Exclude Editor: 0\n"
+        f"{excluded}"
         f"{enabled}  userData: \n"
     )

@@ -1,9 +1,8 @@
 """A rigid ball in hard, frictionless contact with a quarter of a block, in CalculiX.
 
 The block's hexahedra of second order with reduced integration (C3D20R) are `fine` wide under the ball and grow away
-from it. The ball is a cap of quadrilaterals, all of whose nodes go down together; their reactions are the force. The
-penalty between the two is so stiff that it yields about a thousandth of a depth. Units are mm, mN and kPa, see
-`calculix`.
+from it. The ball is a cap of hexahedra all of whose nodes go down together; their reactions are the force. Units are
+mm, mN and kPa, see `calculix`.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ import numpy as np
 KILO, MILLI = 1e3, 1e-3
 REACH = 0.8  # of the fine part and of the cap, over the ball's radius
 GROWTH = 1.5  # of an element over the one before, outside the fine part
-FACET = 0.04  # width of the cap's facets over the ball's radius: they lie 0.2 thousandths of it inside the ball
-PENALTY = 300.0  # kPa per mm over E/R
+FACET = 0.04  # width of the cap's facets over the ball's radius: 0.02 % of it inside the ball at most
+PENALTY = 600.0  # stiffness of the penalty over E/R: it takes 0.4 % of the force at a tenth of the radius
 THICK = 0.1  # of the cap over the ball's radius
 # corners of an element in CalculiX's order, then the middles of its edges
 CORNERS = ((0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2))
@@ -41,7 +40,9 @@ def graded(length: float, reach: float, fine: float) -> np.ndarray:
     return np.concatenate([ends[:count], tail])
 
 
-def deck(law: str, young: float, size: tuple[float, float], radius: float, depths: list[float], fine: float) -> str:
+def deck(
+    law: str, young: float, size: tuple[float, float], radius: float, depths: list[float], fine: float
+) -> str:
     """Input for CalculiX: a block of a width and a height in m under a ball, its depths in m from shallow to deep."""
     width, height, ball = size[0] / 2 / MILLI, size[1] / MILLI, radius / MILLI
     across = graded(width, REACH * ball, fine / MILLI)
@@ -49,8 +50,12 @@ def deck(law: str, young: float, size: tuple[float, float], radius: float, depth
     lines = [*_block(across, down), *_cap(ball)]
     lines += ["*MATERIAL, NAME=LAW", law, "*SOLID SECTION, ELSET=BODY, MATERIAL=LAW"]
     lines += ["*MATERIAL, NAME=HARD", "*ELASTIC", "1e6, 0.3", "*SOLID SECTION, ELSET=BALL, MATERIAL=HARD"]
-    stiff = PENALTY * young / KILO / ball
-    lines += ["*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{stiff!r}"]
+    stiff = PENALTY * young / KILO / ball  # kPa/mm
+    lines += [
+        "*SURFACE INTERACTION, NAME=TOUCH",
+        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
+        f"{stiff!r}",
+    ]
     lines += ["*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE", "TOP, CAP"]
     lines += ["*BOUNDARY", "BOTTOM, 1, 3", "XSIDE, 1, 1", "YSIDE, 2, 2", "CAPNODES, 1, 2"]
     for depth in depths:

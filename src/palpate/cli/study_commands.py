@@ -112,7 +112,12 @@ def sweep_file(
 
 
 def refine_elements(
-    study: Study, file: Path, console: Console, *, workers: int | None = None, scheduler: Scheduler | None = None
+    study: Study,
+    file: Path,
+    console: Console,
+    *,
+    workers: int | None = None,
+    scheduler: Scheduler | None = None,
 ) -> Study:
     """Return a study with elements of the size that finer solves choose, as its file says it afterwards.
 

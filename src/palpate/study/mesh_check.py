@@ -109,7 +109,8 @@ def refine_study(
     left = part * (smaller / size) ** 2
     log(
         f"elements of {millimetres(smaller)}, since the mesh's part is {share(part)} with {millimetres(size)}; about "
-        f"{share(left)} is left" + (", for which the file can ask for smaller ones" if left > 2 * wanted else "")
+        f"{share(left)} is left"
+        + (", for which the file can ask for smaller ones" if left > 2 * wanted else "")
     )
     document = tomlkit.parse(file.read_text(encoding="utf-8"))
     document.setdefault("sweep", tomlkit.table())["element"] = smaller

@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeAlias
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from palpate.physics import GluedPad, PointLoad, SphereProbe
+from palpate.physics.interactions.glued import NO_RIGID_GRIP
 from palpate.physics.interactions.sphere import RIGID
 from palpate.physics.shapes.naming import members
 from palpate.physics.solid.body_family import BESIDE, UNITS
@@ -175,6 +176,13 @@ class PadRecord(_OnSurface):
     displacement: tuple[Pair, Pair, Pair] = Field(
         ((-0.004, 0.004), (-0.004, 0.004), (-0.004, 0.004)), description="ranges along x, y and z, m"
     )
+
+    @field_validator("pad", mode="before")
+    @classmethod
+    def _no_rigid_grip(cls, pad: Any) -> Any:
+        if isinstance(pad, str) and pad.strip().lower() == RIGID:
+            raise ValueError(f"a glued pad can't be rigid. {NO_RIGID_GRIP} Give a stiffness such as 2e7")
+        return pad
 
     @model_validator(mode="after")
     def _in_order(self) -> PadRecord:

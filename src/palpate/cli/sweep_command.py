@@ -45,6 +45,14 @@ def sweep(
             "--minutes", least=0, help="With --until: minutes after which no further batch begins."
         ),
     ] = None,
+    element: Annotated[
+        str | None,
+        typer.Option(
+            metavar="auto",
+            help="For a body under a probe, auto: three touches on two meshes decide the size of the elements, which "
+            "the file then states. Default: the file's own.",
+        ),
+    ] = None,
     workers: Annotated[
         int | None,
         count_option("--workers", least=1, help="Number of worker processes. Default: one per core."),
@@ -77,12 +85,24 @@ def sweep(
     A study with a table *solver* runs the program that it names, once for each case; the command is printed first.
     """
     from palpate.cli.study_commands import sweep_file
+    from palpate.study.part_study import AUTO
     from palpate.study.solver_study import says_solver
     from palpate.sweeps import Scheduler
+
+    if element not in {None, AUTO}:
+        raise UsageError(
+            f"--element {element} asks a sweep for elements of a size.",
+            why="The study file states the size of its elements; only auto lets touches on two meshes decide it.",
+            fix=f"Write it there, [sweep] element, or give --element {AUTO}.",
+        )
 
     if says_solver(study):
         from palpate.cli.solver_sweep_command import SolverSweepOptions, sweep_solver_file
 
+        if element is not None:
+            raise UsageError(
+                "The program of a study with [solver] makes its own mesh.", fix="Leave --element out."
+            )
         chosen = until is not None or minutes is not None
         elsewhere = any(option is not None for option in (scheduler, tls_ca, tls_cert, tls_key))
         wishes = SolverSweepOptions(samples, workers, case_limit, chosen, elsewhere)
@@ -104,10 +124,18 @@ def sweep(
             workers=workers,
             case_limit=case_limit,
         )
-        improve_file(study, options, own, Console(as_json, verbose))
+        improve_file(study, options, own, Console(as_json, verbose), refine=element is not None)
         return
     if minutes is not None:
         raise UsageError(
             "A sweep of a design has no limit on time.", fix="Give --until, or leave --minutes out."
         )
-    sweep_file(study, workers, Console(as_json, verbose), own, case_limit=case_limit, samples=samples)
+    sweep_file(
+        study,
+        workers,
+        Console(as_json, verbose),
+        own,
+        case_limit=case_limit,
+        samples=samples,
+        refine=element is not None,
+    )

@@ -357,10 +357,10 @@ class _Improvement:
         train = self.kept.good
         assert train is not None
         self.pressed = self._pressed(train)
+        # counted from what the surrogate counts from: over grooves that is the overlap
+        baseline = self.pressed.baseline if self.best is None else self.best[0].hand_energy.baseline
         with threadpool_limits(1):
-            self.model = ForceModel.fit(
-                self.pressed.solves, self.pressed.baseline, self.model, seed=self.options.seed
-            )
+            self.model = ForceModel.fit(self.pressed.solves, baseline, self.model, seed=self.options.seed)
         return self.model
 
     def _pressed(self, train: Dataset) -> PressedSolves:

@@ -3,7 +3,7 @@
 A temperature goes with one over a conductivity and one over a heat transfer coefficient: over a range of one to ten it
 bends far more at the low end, and a network whose units are as wide everywhere needs more samples. An input of one sign
 whose ends differ by a factor of two or more may take the bend of `log_bend`; which of them do is decided one after the
-other, by the error of samples left out of Gaussian processes (in closed form, Rasmussen & Williams 2006, eq. 5.12).
+other, by the error of samples left out of Gaussian processes (`answer_process`).
 """
 
 from __future__ import annotations
@@ -12,13 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from palpate.learning.kernel_layer import likely_metric
-from palpate.network import Scaling
-from palpate.network.radial import RADIAL_FUNCTIONS
-from palpate.rbf.output_modes import leading_modes
+from palpate.learning.arrays.answer_process import AnswerProcess, joined_answers
 from palpate.units import Range, bounds
 
-__all__ = ["choose_bends", "log_bend"]
+__all__ = ["choose_bends", "log_bend", "process_of"]
 
 _RATIO = 2.0  # of the ends of a range, below which a logarithm is as good as straight
 _CLEARLY = 0.9  # times the error of samples left out: a bend is worth it
@@ -49,18 +46,18 @@ def choose_bends(X: np.ndarray, parts: Sequence[np.ndarray], inputs: Sequence[Ra
     bends, ends = np.zeros(len(inputs)), np.array(bounds(inputs))
     trials = [log_bend(r.low, r.high) for r in inputs]
     ratio = np.abs(ends).max(axis=0) / np.maximum(np.abs(ends).min(axis=0), 1e-300)
-    left = [i for i in np.argsort(-ratio)[:_INPUTS] if trials[i] and ratio[i] >= _RATIO]
+    left = [int(i) for i in np.argsort(-ratio)[:_INPUTS] if trials[i] and ratio[i] >= _RATIO]
     if not left:
         return bends
     some = np.random.default_rng(0).permutation(len(X))[:_ROWS]
-    targets = np.hstack([_spread_to_one(np.asarray(part, float)[some]) for part in parts])
-    best = _error_left_out(X[some], targets, inputs, bends)
+    Y = joined_answers(parts, some)
+    best = AnswerProcess.likeliest(X[some], Y, inputs, bends).error
     while left:
         errors = []
         for i in left:
             tried = bends.copy()
             tried[i] = trials[i]
-            errors.append(_error_left_out(X[some], targets, inputs, tried))
+            errors.append(AnswerProcess.likeliest(X[some], Y, inputs, tried).error)
         winner = int(np.argmin(errors))
         if errors[winner] >= _CLEARLY * best:
             break
@@ -70,24 +67,7 @@ def choose_bends(X: np.ndarray, parts: Sequence[np.ndarray], inputs: Sequence[Ra
     return bends
 
 
-def _spread_to_one(values: np.ndarray) -> np.ndarray:
-    """Return the leading modes of values (N, m), whose squares add up to one at the mean sample."""
-    off = values - values.mean(axis=0)
-    size = np.sqrt((off**2).sum(axis=1).mean())
-    if not size > 0.0:
-        return np.zeros((len(values), 0))
-    return np.asarray(leading_modes(off / size, most=min(8, *off.shape))[0])
-
-
-def _error_left_out(X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range], bends: np.ndarray) -> float:
-    """Return the root mean square by which the likeliest Gaussian process misses samples left out one by one."""
-    xi = Scaling.of(inputs, Y, bends=bends).scale_inputs(X)
-    errors = []
-    for name in RADIAL_FUNCTIONS:
-        metric = likely_metric(name, xi, Y)
-        one = np.hstack([np.ones((len(xi), 1)), xi])
-        # a plane of large variance beside the process: its coefficients are left out with the sample
-        C = metric.covariance(xi) + 1e3 * (one @ one.T)
-        inverse = np.linalg.inv(C)
-        errors.append(float(np.sqrt((((inverse @ Y) / np.diagonal(inverse)[:, None]) ** 2).mean())))
-    return min(errors)
+def process_of(X: np.ndarray, parts: Sequence[np.ndarray], inputs: Sequence[Range]) -> AnswerProcess:
+    """Return the process of answers `parts`, each (N, m), at inputs X (N, n), with the bends that suit them."""
+    bends = choose_bends(X, parts, inputs)
+    return AnswerProcess.likeliest(X, joined_answers(parts, np.arange(len(X))), inputs, bends)

@@ -41,13 +41,17 @@ def _ezyrb(X: np.ndarray, Y: np.ndarray) -> Iterable[Fit]:
     from sklearn.gaussian_process.kernels import Matern
 
     n = X.shape[1]
-    kernels = {"squared exponential": SquaredExponential(np.ones(n)), "Matérn 5/2": Matern(np.ones(n), nu=2.5)}
+    kernels = {
+        "squared exponential": SquaredExponential(np.ones(n)),
+        "Matérn 5/2": Matern(np.ones(n), nu=2.5),
+    }
     makers: dict[str, Callable[[], object]] = {
         f"POD, GPR, {name}": lambda kernel=kernel: GPR(kern=kernel, optimization_restart=3)
         for name, kernel in kernels.items()
     }
     makers |= {
-        f"POD, RBF, {name}": lambda name=name: RBF(kernel=name) for name in ("cubic", "thin_plate_spline", "quintic")
+        f"POD, RBF, {name}": lambda name=name: RBF(kernel=name)
+        for name in ("cubic", "thin_plate_spline", "quintic")
     }
     makers |= {
         f"POD, RBF, multiquadric, ε {epsilon:g}": lambda epsilon=epsilon: RBF("multiquadric", epsilon=epsilon)
@@ -91,7 +95,10 @@ def _openturns(X: np.ndarray, Y: np.ndarray) -> Iterable[Fit]:
     import openturns as ot
 
     n = X.shape[1]
-    kernels = {"squared exponential": ot.SquaredExponential, "Matérn 5/2": lambda s: ot.MaternModel(s, [1.0], 2.5)}
+    kernels = {
+        "squared exponential": ot.SquaredExponential,
+        "Matérn 5/2": lambda s: ot.MaternModel(s, [1.0], 2.5),
+    }
     bases = {"constant": ot.ConstantBasisFactory, "linear": ot.LinearBasisFactory}
     for (kernel, make), (trend, basis) in itertools.product(kernels.items(), bases.items()):
 
@@ -120,7 +127,9 @@ def _openturns(X: np.ndarray, Y: np.ndarray) -> Iterable[Fit]:
 
         def chaos(X: np.ndarray, Y: np.ndarray, degree: int = degree) -> FieldModel:
             uniform = ot.JointDistribution([ot.Uniform(-1.0, 1.0)] * n)
-            family = ot.OrthogonalProductPolynomialFactory([ot.LegendreFactory()] * n, ot.HyperbolicAnisotropicEnumerateFunction(n, 0.7))
+            family = ot.OrthogonalProductPolynomialFactory(
+                [ot.LegendreFactory()] * n, ot.HyperbolicAnisotropicEnumerateFunction(n, 0.7)
+            )
             size = family.getEnumerateFunction().getBasisSizeFromTotalDegree(degree)
             sparse = ot.LeastSquaresMetaModelSelectionFactory(ot.LARS(), ot.CorrectedLeaveOneOut())
 
@@ -163,7 +172,10 @@ def best_of(
 
     def scaled(X: np.ndarray, *, logs: bool) -> np.ndarray:
         taken = [np.log(a) if logs and one else a for a, one in zip(X.T, positive, strict=True)]
-        ends = [(np.log(a), np.log(b)) if logs and one else (a, b) for a, b, one in zip(low, high, positive, strict=True)]
+        ends = [
+            (np.log(a), np.log(b)) if logs and one else (a, b)
+            for a, b, one in zip(low, high, positive, strict=True)
+        ]
         return np.stack([(2.0 * x - a - b) / (b - a) for x, (a, b) in zip(taken, ends, strict=True)], axis=1)
 
     held = np.arange(len(X)) % 5 == 2
@@ -175,7 +187,11 @@ def best_of(
                 warnings.simplefilter("ignore")  # of optimisers at the ends of their ranges
                 try:
                     missed = fit(Z[~held], Y[~held]).predict(Z[held]) - Y[held]
-                except (ArithmeticError, RuntimeError, ValueError):  # a setting that these solves do not decide
+                except (
+                    ArithmeticError,
+                    RuntimeError,
+                    ValueError,
+                ):  # a setting that these solves do not decide
                     continue
             error = float(np.sqrt((missed**2).mean()))
             if best is None or error < best[0]:

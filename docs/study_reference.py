@@ -71,7 +71,9 @@ def _tables() -> Iterator[str]:
     yield from _table("`[[interaction.loads]]`, once per load", LoadRecord, _purpose(LoadRecord))
     yield from _table("`[memory]`, of a body that yields or creeps", MemoryRecord, _purpose(MemoryRecord))
     yield from _table("`[[varied]]`, once per number", VariedRecord, _purpose(VariedRecord))
-    for kind, sections in SECTIONS.items():
+    kinds = [acting.model_fields["kind"].default for acting in get_args(InteractionRecord)]
+    for kind in (*kinds, "memory"):
+        sections = SECTIONS[kind]
         where = "of a body with memory" if kind == "memory" else f"with the interaction `{kind}`"
         for name, record in sections.items():
             yield from _table(f"`[{name}]` {where}", record, _purpose(record))

@@ -176,7 +176,7 @@ def test_histories_of_a_held_body_say_what_they_are(palpate):
     path = Path(__file__).parents[1] / "data" / "former" / "histories.palpate"
     assert "1 history with 50 samples" in palpate("ask", path).out
     answer = palpate("ask", path, "--at", "0,0,0")
-    assert (answer.code, "does not answer at a place" in answer.err) == (2, True)
+    assert (answer.code, "no learnt body and no network" in answer.err) == (2, True)
 
 
 @pytest.mark.full

@@ -280,7 +280,7 @@ def learn_dataset_file(path: Path, effort: float, console: Console, leave_out: S
     from palpate.learning import learn_dataset
 
     data = Dataset.open(path)
-    console.say(f"Learning from {len(data.ok)} solves …")
+    console.say(f"Learning from {data.ok.size_in_words} …")
     model, history = learn_dataset(
         data,
         name=path.stem,

@@ -79,23 +79,10 @@ def history_dataset(
     elastic: LoadHistory | None = None,
     seconds: float = 0.0,
 ) -> Dataset:
-    """Return histories as a dataset.
+    """Return histories under one load, N, as a dataset; learning needs the one of the body without its memory too.
 
-    Parameters
-    ----------
-    paths : sequence of LoadHistory
-        Each from the virgin body.
-    load : Range
-        The one load, N.
-    layout : Layout
-        Of a plane body, with the held node and the direction of its load.
-    origin : mapping
-        Provenance, as plain data. Its ``relaxes`` says whether the body creeps with time; else it yields. The body's
-        ``half_height``, m, is for the picture.
-    elastic : LoadHistory, optional
-        Of the same body without its memory, which learning needs.
-    seconds : float
-        Time of a solve, s.
+    `layout` is of a plane body, with the held node and the direction of its load. `origin` is the provenance; its
+    ``relaxes`` says whether the body creeps with time, else it yields. `seconds` is the time of a solve.
     """
     numbered = [*enumerate(paths), *([] if elastic is None else [(ELASTIC, elastic)])]
     nodes, count = len(layout.rest), sum(len(path) for _, path in numbered)

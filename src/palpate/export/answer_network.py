@@ -23,7 +23,7 @@ from palpate.network import Network, Scaling, TrainedRegion
 from palpate.surrogates import LearntQuantities, ModalField, Surrogate
 from palpate.units import Quantity, Range
 
-__all__ = ["AnswerNetwork", "Choice", "answer_network", "answers_of", "whole_answers"]
+__all__ = ["AnswerNetwork", "Choice", "answer_network", "answers_of"]
 
 
 @dataclass(frozen=True)
@@ -126,12 +126,9 @@ class _Rows:
 
 
 def answers_of(surrogate: Surrogate) -> AnswerNetwork | None:
-    """Return what a surrogate that no hand feels answers as a whole; None of a touched body."""
-    return None if surrogate.can_be_touched else whole_answers(surrogate)
-
-
-def whole_answers(surrogate: Surrogate) -> AnswerNetwork:
-    """Return all numbers, and all values of all fields and curves; an error where there are none."""
+    """Return all numbers, fields and curves of a surrogate that no hand feels; None of a touched body."""
+    if surrogate.can_be_touched:
+        return None
     rows = [*_numbers(surrogate)]
     rows += [_values(shown, range(len(shown.places))) for shown in surrogate.modal_fields.values()]
     return _assemble(surrogate, rows, ())

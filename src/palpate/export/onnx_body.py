@@ -152,7 +152,7 @@ def _bend(graph: Graph, distance: Distance, place: Value, g: Value, step: float)
     """Return the derivative of ∇²d along g, by differences of fourth order."""
     size = graph.sqrt((g * g).sum(1))
     way = g / graph.where(size > 0.0, size, 1.0)
-    parts = []
+    parts: list[Value] = []
     for many, weight in ((1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)):
         bend = distance(place + (many * step) * way)[2]
         parts.append((size * (weight / (12.0 * step))).spread(2) * bend)

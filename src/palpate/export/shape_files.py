@@ -148,19 +148,18 @@ def series_of_dataset(data: Dataset, rows: Sequence[int] | None = None, name: st
 
 def series_of_surrogate(surrogate: Surrogate, X: np.ndarray) -> ShapeSeries:
     """Return the shapes at inputs X (k, n), numbered from 1, of a body that was learnt with its displacement."""
-    shown = surrogate.fields.get("displacement")
-    if shown is None:
+    shown, line = surrogate.surface_fields.get("displacement"), surrogate.line
+    if shown is not None:
+        (points, cells), u = shown.pictured, shown.at_pictured(shown.values(X))
+    elif line is not None:
+        cells = _pieces(line.points[:, 0])
+        points, u = _upright(line.points[:, :2]), _upright(line.values(X)[..., :2])
+    else:
         raise UsageError(
             f"The body {surrogate.name!r} has no shape.",
             why="It was learnt without its displacement.",
             fix="Learn it with shape=True.",
         )
-    u = np.asarray(shown.values(X))
-    if (on_surface := surrogate.surface_fields.get("displacement")) is not None:
-        (points, cells), u = on_surface.pictured, on_surface.at_pictured(u)
-    else:
-        cells = _pieces(shown.points[:, 0])
-        points, u = _upright(shown.points[:, :2]), _upright(u[..., :2])
     fields = {}
     if (stress := surrogate.surface_fields.get("von_mises")) is not None:
         fields["von Mises stress"] = stress.at_pictured(np.asarray(stress.values(X)))[..., 0]

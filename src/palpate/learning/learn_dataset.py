@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from palpate import checks
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
-from palpate.format import count, share
+from palpate.format import share
 from palpate.learning import bent_body, pad_solves, plastic, pressed_solves  # noqa: F401  # which enter the kinds that they recognise
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
@@ -90,7 +90,8 @@ class LearningHistory:
             ]
             return "\n  ".join([*lines, *map(str, self.fields.values())])
         tried = len(self.energy.trials)
-        words = f"{self.solves} solves, {tried} networks of the energy tried in {self.seconds:.0f} s"
+        noun = "solves" if self.memory is None else "samples of histories"
+        words = f"{self.solves} {noun}, {tried} networks of the energy tried in {self.seconds:.0f} s"
         left = self.energy.meta.get("left_out", {})
         if left:
             words += (
@@ -192,7 +193,7 @@ def learn(
     if known is None:
         _refuse_options(further)
         return _learn_answers(train, name, options, log)
-    log(f"learning the energy of {count(solves, 'solve')}")
+    log(f"learning the energy of {train.size_in_words}")
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
 
     def limit(share: float) -> float | None:

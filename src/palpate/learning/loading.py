@@ -17,7 +17,7 @@ from palpate.network import Archive, Network, load_archive
 from palpate.surrogates import Surrogate
 from palpate.units import Range
 
-__all__ = ["Loaded", "load", "load_histories", "load_surrogate"]
+__all__ = ["Loaded", "load", "load_histories", "load_surrogate", "surrogate_of"]
 
 Loaded: TypeAlias = Surrogate | Fitted | Network | Dataset
 
@@ -55,16 +55,20 @@ def load(path: str | os.PathLike[str]) -> Loaded:
 
 
 def load_surrogate(path: str | os.PathLike[str]) -> Surrogate:
-    """Return what a file holds as a surrogate: of a network its quantities ``outputs``; histories are refused."""
-    learnt, name = load(path), Path(path).stem
+    """Return what a file holds as a surrogate; histories are refused."""
+    return surrogate_of(load(path), Path(path).stem)
+
+
+def surrogate_of(learnt: Loaded, name: str) -> Surrogate:
+    """Return what was learnt as a surrogate: of a network, which gets the name, its quantities ``outputs``."""
     if isinstance(learnt, Fitted):
         made = learnt.surrogate(name)
         (part,) = made.quantities.values()
         return replace(made, quantities={"outputs": part})
     if isinstance(learnt, Dataset):
         raise UsageError(
-            f"{path} holds no learnt body and no network.",
-            why="These are what other tools can evaluate.",
+            f"{name} is a dataset, and no learnt body and no network.",
+            why="It holds solves, which answer nowhere else.",
             fix="Give a file of `palpate learn` or `palpate fit`.",
         )
     return Surrogate.of(learnt, name)
@@ -80,7 +84,7 @@ def load_histories(path: str | os.PathLike[str]) -> Dataset:
         columns = [np.split(arrays[name], ends) for name in names]
         paths = [LoadHistory(*parts) for parts in zip(*columns, strict=True)]
         of_interest = np.isin(np.arange(len(arrays["rest"])), [int(i) for i in meta["of_interest"]])
-        layout = Layout(arrays["rest"], of_interest, [int(meta["node"])], [arrays["direction"]])
+        layout = Layout(arrays["rest"], of_interest, [int(meta["node"])], [arrays["direction"].tolist()])
         body = {"type": "Cantilever", "half_height": float(meta["radius"])}
         # a body that yields knows no time: its samples were numbered
         relaxes = not all(np.array_equal(one.times, np.arange(1.0, 1.0 + len(one))) for one in paths)

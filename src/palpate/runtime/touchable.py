@@ -69,7 +69,7 @@ class Touchable:
     @property
     def surface(self) -> TouchedSurface | None:
         """The touched surface at rest, where a free probe touches one; otherwise None."""
-        return self.energy.baseline.surface  # type: ignore[no-any-return]
+        return self.energy.baseline.surface
 
     @property
     def holds(self) -> bool:

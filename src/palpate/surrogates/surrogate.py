@@ -263,8 +263,8 @@ class Surrogate:
 
     def trusted(self, X: np.ndarray) -> np.ndarray:
         """Return which of X (N, n) are like what was learnt from, by every part of the surrogate, (N,) bool."""
-        parts = (*self.quantities.values(), *(f for f in self.fields.values() if f.asked_as_body))
-        answers = [part.trusted(X) for part in parts]
+        answers = [part.trusted(X) for part in self.quantities.values()]
+        answers += [shown.trusted(X) for shown in self.fields.values() if shown.asked_as_body]
         answers += [] if self.energy is None else [self.energy.inside(X)]
         return np.asarray(np.all(answers, axis=0)) if answers else np.ones(len(X), dtype=bool)
 

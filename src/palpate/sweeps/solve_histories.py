@@ -8,12 +8,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from palpate.dataset import Dataset, Layout
+from palpate.dataset import Dataset
 from palpate.dataset.histories import LoadHistory, history_dataset
 from palpate.errors import UsageError
 from palpate.sweeps.drives import held_loads, load_unload_reload, random_times, random_turns
 from palpate.sweeps.plan import provenance
-from palpate.units import Range
+from palpate.sweeps.problem import Problem
 
 __all__ = ["HistoryProblem", "solve_elastic", "solve_histories"]
 
@@ -23,19 +23,8 @@ RAISES = 12  # of its load by half, until it reaches as far
 BEYOND = 1.05  # how far it reaches over the histories, for those that go farther
 
 
-class HistoryProblem(Protocol):
+class HistoryProblem(Problem, Protocol):
     """A problem with one load that can be led through histories; `palpate.physics.beam.BeamProblem` is one."""
-
-    @property
-    def ranges(self) -> tuple[Range, ...]:
-        """The load, N."""
-
-    @property
-    def layout(self) -> Layout:
-        """Nodes, the held one among them, and the direction of its load."""
-
-    def describe(self) -> dict[str, Any]:
-        """Return everything that decides the answers, as plain data."""
 
     def solve_path(self, loads: Any, times: Any = None) -> Sequence[Any]:
         """Answers with `converged`, `displacement` (node, 3), `strain_energy` and `dissipated`, one for each load."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from palpate.learning import History
 from palpate.learning.bent_body import hand_coordinates
 from palpate.learning.learn_dataset import LearningHistory, filter_record
 from palpate.network import TrainedRegion
-from palpate.surrogates import FieldSurrogate, LearntEnergy, NodeField, Surrogate
+from palpate.surrogates import Field, FieldSurrogate, LearntEnergy, LearntQuantities, NodeField, Surrogate
 from palpate.units import Range, bounds
 from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
 
@@ -92,13 +93,12 @@ class Subject:
 
 def _required(test: Dataset | TouchSolves, name: str) -> Dataset:
     """Return the dataset that judges a surrogate; an error for anything else."""
-    data: Dataset | None = test if hasattr(test, "provenance") else getattr(test, "data", None)
-    if data is None:
+    if not hasattr(test, "provenance"):
         raise UsageError(
             f"{name} is judged by a dataset, not by {type(test).__name__} {test!r:.60}.",
             fix="Give what `palpate.sweep` or `palpate.import_results` returned, or `Dataset.open(path)`.",
         )
-    return data
+    return cast("Dataset", test)
 
 
 def _by_answers(model: Surrogate, test: Dataset) -> Subject:
@@ -112,7 +112,8 @@ def _by_answers(model: Surrogate, test: Dataset) -> Subject:
             fix="Test with solves of the same inputs, in the same order and units.",
         )
     seen = np.zeros(len(good), dtype=bool)
-    for part in (*model.quantities.values(), *model.fields.values()):
+    parts: list[LearntQuantities | Field] = [*model.quantities.values(), *model.fields.values()]
+    for part in parts:
         if part.region is not None:
             seen |= part.region.distances(part.network.scaling.scale_inputs(good.X)) < SEEN
     if seen.all():
@@ -124,7 +125,7 @@ def _by_answers(model: Surrogate, test: Dataset) -> Subject:
     notes = [f"{count(int(seen.sum()), 'solve')} left out: learnt from."] if seen.any() else []
     if far := int((~model.trusted(unseen.X)).sum()):
         notes.append(f"{far} of {len(unseen)} are in no training solve's neighbourhood, and not trusted.")
-    units = sum(part.network.units for part in (*model.quantities.values(), *model.fields.values()))
+    units = sum(part.network.units for part in parts)
     return Subject(
         model.name,
         len(unseen),

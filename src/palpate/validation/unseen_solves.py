@@ -132,11 +132,10 @@ class TouchSolves:
 
     def take(self, rows: np.ndarray) -> TouchSolves:
         """Return some of the solves, by a mask or indices."""
-        parts = [
-            None if part is None else part[rows] for part in (self.X, self.force, self.energy, self.stiffness)
-        ]
-        own = self.data
-        return TouchSolves(*parts, None if own is None else own.take(np.arange(len(self))[rows]))
+        energy = None if self.energy is None else self.energy[rows]
+        stiffness = None if self.stiffness is None else self.stiffness[rows]
+        data = None if self.data is None else self.data.take(np.arange(len(self))[rows])
+        return TouchSolves(self.X[rows], self.force[rows], energy, stiffness, data)
 
     @classmethod
     def of(cls, test: Dataset | TouchSolves, inputs: Sequence[Range]) -> TouchSolves:

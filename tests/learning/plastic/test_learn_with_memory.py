@@ -134,3 +134,14 @@ def test_the_tables_of_a_dent_come_back() -> None:
     np.testing.assert_allclose(found.reach, made.reach, rtol=1e-4)
     np.testing.assert_allclose(found.residual, made.residual, atol=1e-4)
     np.testing.assert_allclose(found.stiffening, made.stiffening, rtol=1e-3)
+
+
+def test_a_split_keeps_histories_whole_and_the_elastic_one_to_learn_from() -> None:
+    rng = np.random.default_rng(4)
+    several = [path(YIELDS, random_turns(rng, -0.5, 0.5, step=0.02, outward=3.0)) for _ in range(4)]
+    train, test = paths(*several, same=elastic(YIELDS)).split(test=0.25, seed=1)
+    numbers = set(np.unique(train["history"])), set(np.unique(test["history"]))
+    assert numbers[0] | numbers[1] == {-1, 0, 1, 2, 3}
+    assert numbers[0] & numbers[1] == set()
+    assert -1 in numbers[0]
+    assert len(numbers[1]) == 1

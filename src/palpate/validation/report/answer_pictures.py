@@ -48,15 +48,19 @@ def _picture(
     solved, answered = truth.values[row], shown.values(x[None])[0]
     spread = shown.deviation(x[None])[0]
     off = f"95 of 100 values are within {share(error.p95)} of the range."
-    axis, mesh = shown.axis, shown.mesh  # one of the two
+
+    def draw() -> Figure:
+        if shown.axis is not None:
+            return plot_curve(shown.axis, solved, answered, spread, shown.name, shown.unit)
+        assert shown.mesh is not None  # places are one of the two
+        return plot_field(shown.mesh, solved, answered, shown.name, shown.unit)
+
     return picture(
         key,
         f"{error.name}, worst case",
         f"{error.name} of the worst unseen case, solved and by the surrogate, {error.worst}. {off}",
         f"The unseen case that is farthest off, {error.worst}: {share(error.largest)} of the range. {off}",
-        (lambda: plot_curve(axis, solved, answered, spread, shown.name, shown.unit))
-        if mesh is None
-        else (lambda: plot_field(mesh, solved, answered, shown.name, shown.unit)),
+        draw,
     )
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import cast
 
+from palpate.dataset import Dataset
 from palpate.format import count, interval, length, plain, scientific, share
 from palpate.input_words import input_in_words
 from palpate.surrogates.rigid_ball import pad_part_of
@@ -165,7 +167,7 @@ def _solves_in_words(chapter: Chapter) -> str:
 
 
 def _solved_by_load(chapter: Chapter) -> str:
-    test = chapter.test
+    test = cast("Dataset", chapter.test)  # the subject's own check
     train = test if chapter.train is None else chapter.train
     loads = ", ".join(
         f"{input_in_words(r.name)} from {r.low:g} to {r.high:g} {r.unit}".rstrip()

@@ -49,7 +49,7 @@ def test_solves_are_chosen_until_the_error_is_kept(palpate, study, tmp_path):
 @pytest.mark.full
 @pytest.mark.timeout(300)
 def test_touches_on_two_meshes_decide_the_size_of_the_elements(palpate, study, tmp_path):
-    """Elements of 12 mm don't feel a ball of 8 mm. The file says the new size, of which the solves are, and keeps it."""
+    """Elements of 12 mm don't feel a ball of 8 mm. The file says the new size, and the solves have it."""
     swept = palpate("sweep", study, "--element", "auto")
     assert swept.code == 0, swept.err
     assert "elements of 6 mm, since the mesh's part is" in swept.err

@@ -16,7 +16,7 @@ KILO, MILLI = 1e3, 1e-3
 REACH = 0.8  # of the fine part and of the cap, over the ball's radius
 GROWTH = 1.5  # of an element over the one before, outside the fine part
 FACET = 0.04  # width of the cap's facets over the ball's radius: 0.02 % of it inside the ball at most
-PENALTY = 600.0  # stiffness of the penalty over E/R: it takes 0.4 % of the force at a tenth of the radius
+PENALTY = 300.0  # stiffness of the penalty over E/R: it takes 0.9 % of the force at a tenth of the radius
 THICK = 0.1  # of the cap over the ball's radius
 # corners of an element in CalculiX's order, then the middles of its edges
 CORNERS = ((0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2))

@@ -55,7 +55,8 @@ def sweep_file(
     """Solve what a study file describes, here or on a scheduler, and print where the solves are.
 
     The workers are by default those of the study; a single solve has failed after `case_limit` seconds. `samples` go in
-    place of the study's own number; a finished sweep is continued. With `refine` finer solves decide the elements' size.
+    place of the study's own number; a finished sweep is continued. With `refine` finer solves decide the elements' size
+    first.
     """
     from palpate.study import read_study
     from palpate.study.run import Paths, sweep_study

@@ -59,8 +59,8 @@ class GluedPad(PlainInteraction):
         ((low, low), (high, high)) in m: p becomes an input in this rectangle of the two coordinates that tell the
         surface's points, x and y on top. Instead of `at`.
     pad : float
-        Stiffness k in N/m³. A number, never "rigid" as a ball's: a rigid disc that is glued has a stress without bound at
-        its rim.
+        Stiffness k in N/m³. A number, never "rigid" as a ball's: a rigid disc that is glued has a stress without
+        bound at its rim.
     displacement : three of range or zero
         Along x, y and z, in m: a range is an input, a component of 0 stays there.
     facing : str, optional

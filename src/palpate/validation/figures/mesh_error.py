@@ -66,8 +66,8 @@ class MeshErrors(Figure):
         if self.count >= ASKED:
             return []
         return [
-            f"Refined solves are few: {self.count} above f₀, where {ASKED} are asked. They give an estimate of the mesh's "
-            "part, and no error of all places."
+            f"Refined solves are few: {self.count} above f₀, where {ASKED} are asked. They give an estimate of the "
+            "mesh's part, and no error of all places."
         ]
 
 

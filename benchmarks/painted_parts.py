@@ -89,7 +89,7 @@ def part_file(name: str, folder: Path) -> Path:
         return Path(name)
     if name in SAMPLES:
         path = folder / f"{name}.stl"
-        return path if path.exists() else write_sample_part(path)
+        return path if path.exists() else write_sample_part(path, name)
     return Path(getattr(scripted_parts, name)(folder))
 
 

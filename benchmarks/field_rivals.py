@@ -1,9 +1,9 @@
 """Fields from few solves by other libraries, each at its best settings.
 
-Every rival is a function (X (N, n), Y (N, nodes)) → `FieldModel`, inputs scaled to [−1, 1]. It takes a proper orthogonal
-decomposition of the fields; for libraries without one, the leading modes by a singular value decomposition. Settings are
-chosen by a fit on four fifths of the solves and its error on every fifth; so is whether inputs come as they are or as
-their logarithms, which palpate too decides by solves left out.
+Every rival is a function (X (N, n), Y (N, nodes)) → `FieldModel`, inputs scaled to [−1, 1]. It takes a proper
+orthogonal decomposition of the fields; for libraries without one, the leading modes by a singular value decomposition.
+Settings are chosen by a fit on four fifths of the solves and its error on every fifth; so is whether inputs come as
+they are or as their logarithms, which palpate too decides by solves left out.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class FieldModel:
 
 
 Fit = Callable[[np.ndarray, np.ndarray], FieldModel]
-_MODES = 12  # more of them change no figure here
-_RANKS = (3, 6, _MODES)  # of EZyRB, one of whose processes is of all modes together
+_MODES = 6  # more of them change no figure here
+_RANKS = (3, _MODES)  # of EZyRB, one of whose processes is of all modes together
 
 
 def _ezyrb(X: np.ndarray, Y: np.ndarray) -> Iterable[Fit]:
@@ -41,13 +41,17 @@ def _ezyrb(X: np.ndarray, Y: np.ndarray) -> Iterable[Fit]:
     from sklearn.gaussian_process.kernels import Matern
 
     n = X.shape[1]
-    kernels = {"squared exponential": SquaredExponential(np.ones(n)), "Matérn 5/2": Matern(np.ones(n), nu=2.5)}
+    kernels = {
+        "squared exponential": SquaredExponential(np.ones(n)),
+        "Matérn 5/2": Matern(np.ones(n), nu=2.5),
+    }
     makers: dict[str, Callable[[], object]] = {
         f"POD, GPR, {name}": lambda kernel=kernel: GPR(kern=kernel, optimization_restart=3)
         for name, kernel in kernels.items()
     }
     makers |= {
-        f"POD, RBF, {name}": lambda name=name: RBF(kernel=name) for name in ("cubic", "thin_plate_spline", "quintic")
+        f"POD, RBF, {name}": lambda name=name: RBF(kernel=name)
+        for name in ("cubic", "thin_plate_spline", "quintic")
     }
     makers |= {
         f"POD, RBF, multiquadric, ε {epsilon:g}": lambda epsilon=epsilon: RBF("multiquadric", epsilon=epsilon)
@@ -91,7 +95,10 @@ def _openturns(X: np.ndarray, Y: np.ndarray) -> Iterable[Fit]:
     import openturns as ot
 
     n = X.shape[1]
-    kernels = {"squared exponential": ot.SquaredExponential, "Matérn 5/2": lambda s: ot.MaternModel(s, [1.0], 2.5)}
+    kernels = {
+        "squared exponential": ot.SquaredExponential,
+        "Matérn 5/2": lambda s: ot.MaternModel(s, [1.0], 2.5),
+    }
     bases = {"constant": ot.ConstantBasisFactory, "linear": ot.LinearBasisFactory}
     for (kernel, make), (trend, basis) in itertools.product(kernels.items(), bases.items()):
 
@@ -107,6 +114,9 @@ def _openturns(X: np.ndarray, Y: np.ndarray) -> Iterable[Fit]:
                     ot.Sample(X), ot.Sample(y[:, None]), make([1.0] * n), basis(n).build()
                 )
                 fitter.setOptimizationBounds(ot.Interval([1e-2] * n, [1e2] * n))
+                solver = ot.Cobyla()  # its default, with enough calls for four lengths
+                solver.setMaximumCallsNumber(2000)
+                fitter.setOptimizationAlgorithm(solver)
                 fitter.run()
                 regression = ot.GaussianProcessRegression(fitter.getResult())
                 regression.run()
@@ -120,7 +130,9 @@ def _openturns(X: np.ndarray, Y: np.ndarray) -> Iterable[Fit]:
 
         def chaos(X: np.ndarray, Y: np.ndarray, degree: int = degree) -> FieldModel:
             uniform = ot.JointDistribution([ot.Uniform(-1.0, 1.0)] * n)
-            family = ot.OrthogonalProductPolynomialFactory([ot.LegendreFactory()] * n, ot.HyperbolicAnisotropicEnumerateFunction(n, 0.7))
+            family = ot.OrthogonalProductPolynomialFactory(
+                [ot.LegendreFactory()] * n, ot.HyperbolicAnisotropicEnumerateFunction(n, 0.7)
+            )
             size = family.getEnumerateFunction().getBasisSizeFromTotalDegree(degree)
             sparse = ot.LeastSquaresMetaModelSelectionFactory(ot.LARS(), ot.CorrectedLeaveOneOut())
 
@@ -163,7 +175,10 @@ def best_of(
 
     def scaled(X: np.ndarray, *, logs: bool) -> np.ndarray:
         taken = [np.log(a) if logs and one else a for a, one in zip(X.T, positive, strict=True)]
-        ends = [(np.log(a), np.log(b)) if logs and one else (a, b) for a, b, one in zip(low, high, positive, strict=True)]
+        ends = [
+            (np.log(a), np.log(b)) if logs and one else (a, b)
+            for a, b, one in zip(low, high, positive, strict=True)
+        ]
         return np.stack([(2.0 * x - a - b) / (b - a) for x, (a, b) in zip(taken, ends, strict=True)], axis=1)
 
     held = np.arange(len(X)) % 5 == 2
@@ -175,7 +190,11 @@ def best_of(
                 warnings.simplefilter("ignore")  # of optimisers at the ends of their ranges
                 try:
                     missed = fit(Z[~held], Y[~held]).predict(Z[held]) - Y[held]
-                except (ArithmeticError, RuntimeError, ValueError):  # a setting that these solves do not decide
+                except (
+                    ArithmeticError,
+                    RuntimeError,
+                    ValueError,
+                ):  # a setting that these solves do not decide
                     continue
             error = float(np.sqrt((missed**2).mean()))
             if best is None or error < best[0]:

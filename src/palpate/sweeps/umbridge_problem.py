@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import json
 import math
+import time
 import urllib.error
 import urllib.parse
 import urllib.request
@@ -32,6 +33,8 @@ __all__ = ["UMBridgeProblem"]
 _LARGEST = 256_000_000  # bytes of an answer
 _LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})  # reached without a proxy
 _QUICK = 30.0  # s for questions that need no solve
+_PAUSES = (0.5, 2.0, 5.0)  # s before the tries after a lost connection
+_AFTER = "Start it again, and sweep under another name: a case that failed is not solved anew."
 
 
 @dataclass(frozen=True)
@@ -207,13 +210,26 @@ class _UMBridgeSolver:
     def reset(self) -> None:
         """Forget earlier cases, of which nothing is kept anyway."""
 
+    def _patiently(self, x: np.ndarray) -> list[list[float]]:
+        """Return the model's answer at `x` (n,); a server that is started again within seconds costs nothing."""
+        for pause in _PAUSES:
+            try:
+                return self.problem.evaluate(x)
+            except ResourceError as error:
+                if isinstance(error.__cause__, TimeoutError):  # it has had its time
+                    raise
+                time.sleep(pause)
+        return self.problem.evaluate(x)
+
     def solve(self, x: np.ndarray) -> Answer:
         """Ask the server for the inputs `x` (n,)."""
         defaults: dict[str, Any] = {"iterations": 0, "residual": math.nan}
         try:
-            cases = self.problem.mapped(x, self.problem.evaluate(x))
+            cases = self.problem.mapped(x, self._patiently(x))
         except PalpateError as error:
-            message = " ".join(filter(None, (error.what, error.why)))
+            message = " ".join(
+                filter(None, (error.what, error.why, _AFTER * isinstance(error, ResourceError)))
+            )
             return SimpleNamespace(converged=False, message=message, **defaults)
         values = {entry.name: cases.answers[entry.name][0] for entry in cases.fields}
         if not bool(cases.finite[0]):

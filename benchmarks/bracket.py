@@ -2,7 +2,7 @@
 
     python -m benchmarks.bracket [--quick] [--json]
 
-`bracket_study` writes the study, `palpate sweep` runs CalculiX for 60 solves to learn from and 100 to judge by; the
+`bracket_study` writes the study, `palpate sweep` runs CalculiX for 60 solves to learn from and 40 to judge by; the
 folder of the environment variable PALPATE_BRACKET keeps them for a later run. Then a scalar field of 20,000 nodes
 through 20 modes is timed, and 60 made-up solves of as many nodes are learnt by a process of its own. Times are those of
 the processor, whatever else the machine does.
@@ -62,7 +62,7 @@ def tables(*, quick: bool = False) -> list[Table]:
 
 
 def _solved(folder: Path, quick: bool) -> tuple[pp.Dataset, pp.Dataset]:
-    samples, unseen = (20, 3) if quick else (60, 100)
+    samples, unseen = (20, 3) if quick else (60, 40)
     study, _ = write_bracket(folder, size=12.0 if quick else 4.2, samples=samples, unseen=unseen)
     subprocess.run([sys.executable, "-m", "palpate", "sweep", str(study)], check=True, capture_output=True)
     return pp.Dataset.open(folder / "bracket.zarr"), pp.Dataset.open(folder / "bracket-random.zarr")

@@ -80,7 +80,15 @@ def _smt(X: np.ndarray, Y: np.ndarray) -> Iterable[Fit]:
 
         def fit(X: np.ndarray, Y: np.ndarray, corr: str = corr, poly: str = poly) -> FieldModel:
             def of_mode(y: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-                model = KRG(corr=corr, poly=poly, theta0=[0.1] * X.shape[1], print_global=False, seed=0)
+                model = KRG(
+                    corr=corr,
+                    poly=poly,
+                    theta0=[0.1] * X.shape[1],
+                    hyper_opt="TNC",
+                    n_start=5,
+                    print_global=False,
+                    seed=0,
+                )
                 model.set_training_values(X, y[:, None])
                 model.train()
                 return lambda Q: model.predict_values(Q)[:, 0]
@@ -115,7 +123,8 @@ def _openturns(X: np.ndarray, Y: np.ndarray) -> Iterable[Fit]:
                 )
                 fitter.setOptimizationBounds(ot.Interval([1e-2] * n, [1e2] * n))
                 solver = ot.Cobyla()  # its default, with enough calls for four lengths
-                solver.setMaximumCallsNumber(2000)
+                solver.setMaximumCallsNumber(1000)
+                solver.setCheckStatus(False)  # its best place so far, where the calls are over
                 fitter.setOptimizationAlgorithm(solver)
                 fitter.run()
                 regression = ot.GaussianProcessRegression(fitter.getResult())

@@ -1,9 +1,9 @@
 """A CalculiX study of a bracket that is heated, cooled and pressed: its folder, for `palpate sweep`.
 
-An angle of 60 x 40 x 50 mm, 6 mm thick, is held by two bolts. A shaft in its wall heats the bore with a heat flux, air at
-293.15 K cools all other faces, and a pressure acts on the wall. Inputs are the heat flux, the heat transfer coefficient
-to the air, the conductivity and the pressure; answers are the temperature and the displacement of all nodes of quadratic
-tetrahedra.
+An angle of 60 x 40 x 50 mm, 6 mm thick, is held by two bolts. A shaft in its wall heats the bore with a heat flux, air
+at 293.15 K cools all other faces, and a pressure acts on the wall. Inputs are the heat flux, the heat transfer
+coefficient to the air, the conductivity and the pressure; answers are the temperature and the displacement of all nodes
+of quadratic tetrahedra.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def write_bracket(folder: Path, *, size: float, samples: int, unseen: int, seed:
 
 
 def _mesh(size: float) -> tuple[str, dict[str, list[tuple[int, int]]], int]:
-    """Return the deck's nodes, elements and bolts, the element faces (element, side) of each name, and the nodes' number."""
+    """Return the deck's nodes, elements and bolts, the faces (element, side) of each name, and the number of nodes."""
     from netgen.occ import Axes, Box, Cylinder, OCCGeometry, X, Y, Z
     from ngsolve import BND, Mesh
 

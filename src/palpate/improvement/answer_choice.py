@@ -1,9 +1,9 @@
 """The next solves of numbers and fields: where a Gaussian process of all answers is least sure, and misses most.
 
-All answers share one process on their leading modes, over scaled inputs. A solve at x lowers the variance at every other
-place x' by k(x, x')²/(k(x, x) + λ), k being the covariance after the solves so far; the next one lowers the sum over all
-places most (Cohn 1996). Places count by what the process misses of the solves beside them when these are left out, over
-what it expects to miss: where the answers bend more than elsewhere, more is solved.
+All answers share one process on their leading modes, over scaled inputs. A solve at x lowers the variance at every
+other place x' by k(x, x')²/(k(x, x) + λ), k being the covariance after the solves so far; the next one lowers the sum
+over all places most (Cohn 1996). Places count by what the process misses of the solves beside them when these are left
+out, over what it expects to miss: where the answers bend more than elsewhere, more is solved.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from palpate.learning.arrays.input_bends import process_of
 from palpate.units import Range
 
-__all__ = ["CANDIDATES", "choose_answers", "stretched"]
+__all__ = ["CANDIDATES", "choose_answers"]
 
 CANDIDATES = 400  # places among which a batch is chosen
 _BORDER = (
@@ -84,10 +84,3 @@ def choose_answers(
         chosen.append(int(np.argmax(score)))
         state.condition(chosen[-1])
     return np.asarray(candidates[chosen])
-
-
-def stretched(unit: np.ndarray) -> np.ndarray:
-    """Return places of the unit cube (C, n), every other one drawn out so that those near a side lie on it."""
-    out = unit.copy()
-    out[::2] = np.clip(0.5 + _BORDER * (unit[::2] - 0.5), 0.0, 1.0)
-    return out

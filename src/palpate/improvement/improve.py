@@ -78,8 +78,8 @@ def improve(
 ) -> Iterator[ImprovementStep]:
     """Solve where the answers are least certain, learn, and yield each step, until an error is kept.
 
-    Of a body under a probe the error is that of the force, over the force; of numbers, fields and curves it is that over
-    the range of the answer that misses most. Either is the 95th percentile of unseen solves.
+    Of a body under a probe the error is that of the force, over the force; of numbers, fields and curves it is that
+    over the range of the answer that misses most. Either is the 95th percentile of unseen solves.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from palpate.errors import UsageError
 from palpate.format import count
-from palpate.improvement.answer_choice import CANDIDATES, choose_answers, stretched
+from palpate.improvement.answer_choice import CANDIDATES, choose_answers
 from palpate.improvement.improvement_step import ImprovementStep
 from palpate.improvement.kept_solves import KeptSolves
 from palpate.improvement.stop_rule import StopRule
@@ -122,8 +122,7 @@ class AnswerImprovement:
         answers = DatasetAnswers.of(self.kept.good)
         parts = [one.values for one in answers.numbers.values()]
         parts += [one.values.reshape(len(answers.X), -1) for one in answers.fields.values()]
-        unit = space.to_unit(sobol(space, CANDIDATES, self.options.seed + 7919 * (1 + solved)))
-        places = space.from_unit(stretched(unit))
+        places = sobol(space, CANDIDATES, self.options.seed + 7919 * (1 + solved))
         failed = self.kept.X[~self.kept.data.converged]
         weights = None if self.interest is None else self.interest(places)
         with threadpool_limits(1):

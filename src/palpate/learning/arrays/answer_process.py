@@ -1,7 +1,7 @@
-"""A Gaussian process that all answers of a dataset share: what it misses of samples left out, and where it is least sure.
+"""A Gaussian process that all answers of a dataset share: what it misses of samples left out, and how sure it is.
 
-Numbers, fields and curves enter by their leading modes, each part scaled to its own spread. What is missed of a sample by
-the process of the others follows in closed form (Rasmussen & Williams 2006, eq. 5.12).
+Numbers, fields and curves enter by their leading modes, each part scaled to its own spread. What is missed of a sample
+by the process of the others follows in closed form (Rasmussen & Williams 2006, eq. 5.12).
 """
 
 from __future__ import annotations

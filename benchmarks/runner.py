@@ -21,6 +21,7 @@ __all__ = ["BENCHMARKS", "Benchmark", "main"]
 
 BENCHMARKS = (
     "active_choice",
+    "bracket",
     "cantilever",
     "cold_start",
     "device_round_trips",
@@ -29,6 +30,7 @@ BENCHMARKS = (
     "few_rows",
     "filters",
     "hand_drives",
+    "heated_plate",
     "latency",
     "literature",
     "online",

@@ -68,7 +68,7 @@ def bump_fit():
 @pytest.mark.full
 def test_ridges_are_learnt_by_ridges(ridge_fit):
     found, (X, Y, X_test, Y_test) = ridge_fit
-    assert found.form == "rank-1"
+    assert found.form in {"rank-1", "rank-2"}  # ridges in one direction each, or in two
     assert relative(found, X_test, Y_test, Y) < 0.2 * cubic_error(X, Y, X_test, Y_test)
 
 

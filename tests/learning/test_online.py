@@ -271,7 +271,14 @@ def test_a_second_sight_of_a_sample_takes_the_place_of_the_first():
 )
 def test_drift_is_followed(refining):
     """A spring whose stiffness falls by 30 %: the network stays near it, a frozen one does not."""
-    rng = np.random.default_rng(0)
+    left = [drifted(refining, seed) for seed in range(5)]
+    assert np.median(left) < 0.1
+    assert max(left) < 1.0, "nothing learnt is worse than not to learn"
+
+
+def drifted(refining, seed):
+    """Error of a network that saw the drift, over that of one that did not."""
+    rng = np.random.default_rng(seed)
     settings = replace(default(), process_noise=1e-3, regression_limit=0.0)
     learner = Learner(
         [Range("P", 0.0, 5.0, "N")], [Range("u", 0.0, 1.0, "m")], settings=settings, refining=refining
@@ -290,7 +297,7 @@ def test_drift_is_followed(refining):
     def rms(network):
         return np.sqrt(((network.predict(grid) - deflection(grid, 500)) ** 2).mean())
 
-    assert rms(learner.network) < 0.1 * rms(frozen)
+    return rms(learner.network) / rms(frozen)
 
 
 @pytest.mark.full

@@ -74,7 +74,7 @@ class Console:
             yield
         finally:
             done.set()
-            thread.join()
+            thread.join(1.0)  # not without an end: Ctrl-C in `set` may leave its lock taken
 
     def result(self, text: str, content: Mapping[str, Any]) -> None:
         """Print the result of a command to stdout."""

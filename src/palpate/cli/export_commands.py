@@ -18,7 +18,7 @@ from palpate.errors import UsageError
 from palpate.number_text import whole_number
 
 if TYPE_CHECKING:
-    from palpate.export import ExportedC, ExportedFmu
+    from palpate.export import ExportedC, ExportedFmu, ExportedPackage
     from palpate.export.check_points import ExportedFile
     from palpate.surrogates import Surrogate
 
@@ -26,7 +26,7 @@ __all__ = ["export_app"]
 
 export_app = typer.Typer(
     cls=CommandGroup,
-    help="Take a learnt body or a network into other tools: C99, a library, an FMU, ONNX, one HTML file.",
+    help="Take a learnt body or a network into other tools: C99, library, FMU, ONNX, Unity, Unreal, one HTML file.",
     no_args_is_help=True,
 )
 
@@ -97,7 +97,7 @@ def _say_left_out(console: Console, thing: Surrogate, *, no_field: bool) -> None
 
 def _print(
     console: Console,
-    done: ExportedC | ExportedFmu | ExportedFile,
+    done: ExportedC | ExportedFmu | ExportedFile | ExportedPackage,
     files: Sequence[Path],
     missing: str,
     *,
@@ -179,7 +179,7 @@ def to_library(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Compile a shared library with a plain C ABI, with wrappers for Python, Unity, Unreal and MATLAB.
+    """Compile a shared library with a plain C ABI, with wrappers for Python and MATLAB.
 
     Without a C compiler the sources and their CMake file are written, to be built elsewhere.
     """
@@ -201,6 +201,64 @@ def to_library(
     whole = replace(done.sources, files=done.files, comparison=done.comparison)
     missing = f"{_NO_COMPILER}: build the library with CMake, -DBUILD_SHARED_LIBS=ON"
     _print(console, whole, done.files, missing, no_check=no_check)
+
+
+@export_app.command("unity")
+def to_unity(
+    file: BodyFile,
+    out: Folder = None,
+    name: Annotated[str | None, typer.Option(help="Name of the package. Default: the file's name.")] = None,
+    no_check: NoCheck = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write a package of Unity: a component, a sample, the mesh at rest, and a library for three systems.
+
+    Nothing is compiled. The library is compared with palpate at 1,000 places; one that differs is refused.
+    """
+    from palpate.export import export_unity
+
+    console = Console(as_json)
+    done = export_unity(
+        _body(file),
+        file.with_name(f"{name or file.stem}-unity") if out is None else out,
+        name=name or _name_of(file),
+        check=not no_check,
+        overwrite=force,
+    )
+    _print(console, done, done.files, "there is no library for this machine", no_check=no_check)
+    console.say(
+        f"Next: in Unity, Package Manager > + > Install package from disk: {done.folder / 'package.json'}"
+    )
+
+
+@export_app.command("unreal")
+def to_unreal(
+    file: BodyFile,
+    out: Folder = None,
+    name: Name = None,
+    no_check: NoCheck = False,
+    compiler: Compiler = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write a plugin of Unreal: a component, the mesh at rest, and sources in C for any platform.
+
+    If there is a C compiler the sources are compared with palpate at 1,000 places; those that differ are refused.
+    """
+    from palpate.export import export_unreal
+
+    console = Console(as_json)
+    done = export_unreal(
+        _body(file),
+        file.with_name(f"{name or file.stem}-unreal") if out is None else out,
+        name=name or _name_of(file),
+        check=not no_check,
+        compiler=compiler,
+        overwrite=force,
+    )
+    _print(console, done, done.files, _NO_COMPILER, no_check=no_check)
+    console.say(f"Next: copy {done.folder} into the folder Plugins of a project of Unreal in C++")
 
 
 @export_app.command("fmu")

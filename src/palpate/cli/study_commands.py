@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import statistics
 import time
 from dataclasses import replace
@@ -27,6 +28,7 @@ __all__ = [
     "learn_dataset_file",
     "learn_file",
     "learn_path",
+    "refine_elements",
     "sweep_file",
     "validate_model",
     "validate_study_file",
@@ -48,11 +50,13 @@ def sweep_file(
     *,
     case_limit: float = CASE_LIMIT,
     samples: int | None = None,
+    refine: bool = False,
 ) -> None:
     """Solve what a study file describes, here or on a scheduler, and print where the solves are.
 
     The workers are by default those of the study; a single solve has failed after `case_limit` seconds. `samples` go in
-    place of the study's own number; a finished sweep is continued.
+    place of the study's own number; a finished sweep is continued. With `refine` finer solves decide the elements' size
+    first.
     """
     from palpate.study import read_study
     from palpate.study.run import Paths, sweep_study
@@ -75,6 +79,8 @@ def sweep_file(
     if scheduler is not None and scheduler.warning:
         console.say(f"Warning: {scheduler.warning}")
     with hold_study(paths, "palpate sweep"):
+        if refine:
+            record = refine_elements(record, study, console, workers=workers, scheduler=scheduler)
         data, further = sweep_study(
             record,
             paths,
@@ -100,6 +106,36 @@ def sweep_file(
     lines.append(f"next    palpate learn {study}")
     content = {"data": str(target), "random": None if further is None else str(other)}
     console.result("\n".join(lines), content | {"rows": sum(map(len, parts)), "failed": failed})
+
+
+def refine_elements(
+    study: Study,
+    file: Path,
+    console: Console,
+    *,
+    workers: int | None = None,
+    scheduler: Scheduler | None = None,
+) -> Study:
+    """Return a study with elements of the size that finer solves choose, as its file says it afterwards.
+
+    A study that has solves keeps its elements.
+    """
+    from palpate.study.mesh_check import refine_study
+    from palpate.study.run import Paths
+    from palpate.sweeps import local_cluster
+
+    if Paths(file.parent, study.name).data.exists():
+        console.say("Its solves are there already, and their elements stay as they are.")
+        return study
+    with contextlib.ExitStack() as stack:
+        cluster = stack.enter_context(local_cluster(workers)) if scheduler is None else scheduler
+        return refine_study(
+            study,
+            file,
+            cluster=cluster,
+            progress=not console.as_json,
+            log=lambda stage: console.say(f"{stage} …"),
+        )
 
 
 def learn_path(

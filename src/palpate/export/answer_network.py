@@ -249,11 +249,11 @@ def _join(rows: Sequence[_Rows]) -> tuple[Network, ...]:
     if any(
         not np.array_equal(getattr(other, ends), getattr(scalings[0], ends))
         for other in scalings
-        for ends in ("input_centre", "input_half")
+        for ends in ("input_centre", "input_half", "input_bend")
     ):
         raise UsageError(
             "The parts of this surrogate can't go out together.",
-            why="They have other ranges of the inputs.",
+            why="They have other ranges or scales of the inputs.",
             fix="Learn all parts together, from one dataset.",
         )
     kinds = list(dict.fromkeys(part.network.radial for part in parts))
@@ -280,7 +280,8 @@ def _of_one_kind(rows: Sequence[_Rows], parts: Sequence[LearntQuantities]) -> Ne
     modes_of_outputs: np.ndarray | None = basis
     if count <= starts[-1]:  # sums of latent outputs are less work than these themselves
         weights, tail, modes_of_outputs = basis @ weights, basis @ tail, None
-    scaling = Scaling(first.scaling.input_centre, first.scaling.input_half, centre, np.ones(count))
+    outer = first.scaling
+    scaling = Scaling(outer.input_centre, outer.input_half, centre, np.ones(count), outer.input_bend)
     names = tuple(quantity for row in rows for quantity in row.outputs)
     return Network(
         first.inputs, names, factors, shifts, weights, tail, scaling, {}, first.radial, modes_of_outputs

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from palpate import checks
 from palpate.dataset import Dataset, Layout
@@ -20,6 +21,7 @@ from palpate.format import share
 from palpate.learning import bent_body, pad_solves, plastic, pressed_solves  # noqa: F401  # which enter the kinds that they recognise
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
+from palpate.learning.arrays.input_bends import choose_bends
 from palpate.learning.dataset_answers import DatasetAnswers
 from palpate.learning.energy import EnergyHistory, SuspectSolve, learn_energy
 from palpate.learning.fields import LearntField, LearntModes, learn_modes
@@ -252,10 +254,17 @@ def _learn_answers(
     answers = DatasetAnswers.of(train)
     numbers: dict[str, Fitted] = {}
     fields: dict[str, LearntModes] = {}
+    every = [*(one.values for one in answers.numbers.values()), *(f.values for f in answers.fields.values())]
+    with threadpool_limits(
+        1
+    ):  # one choice for all parts: they leave together, as networks of the same inputs
+        bends = choose_bends(answers.X, [v.reshape(len(v), -1) for v in every], answers.inputs)
     for group, part in answers.numbers.items():
         log(group)
         search = _fit_options(options, budget, len(answers.numbers) + len(answers.fields) - len(numbers))
-        numbers[group] = fit(answers.X, part.values, list(answers.inputs), list(part.outputs), options=search)
+        numbers[group] = fit(
+            *(answers.X, part.values, list(answers.inputs), list(part.outputs)), bends=bends, options=search
+        )
     for shown, one in answers.fields.items():
         log(f"{shown} at {one.places}")
         search = _fit_options(options, budget, len(answers.fields) - len(fields))
@@ -267,6 +276,7 @@ def _learn_answers(
             name=shown,
             unit=one.unit,
             components=one.components,
+            bends=bends,
             options=search,
         )
     meta = {

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from palpate.physics import GluedPad
+from palpate.physics.interactions.glued import NO_RIGID_GRIP
+from palpate.physics.interactions.sphere import RIGID
 from palpate.records import Count, Metres, PadStiffness, Pair, Record
 from palpate.study.interaction_records import OnSurface, require_corners
 from palpate.study.stage_records import SECTIONS, EnergyLearningRecord, SweepRecord, TouchTargetRecord
@@ -32,6 +34,13 @@ class PadRecord(OnSurface):
     displacement: tuple[Pair, Pair, Pair] = Field(
         ((-0.004, 0.004), (-0.004, 0.004), (-0.004, 0.004)), description="ranges along x, y and z, m"
     )
+
+    @field_validator("pad", mode="before")
+    @classmethod
+    def _no_rigid_grip(cls, pad: object) -> object:
+        if isinstance(pad, str) and pad.strip().lower() == RIGID:
+            raise ValueError(f"a glued pad can't be rigid. {NO_RIGID_GRIP} Give a stiffness such as 2e7")
+        return pad
 
     @model_validator(mode="after")
     def _in_order(self) -> PadRecord:

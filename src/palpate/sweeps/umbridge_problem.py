@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import json
+import time
 import urllib.error
 import urllib.parse
 import urllib.request
@@ -30,6 +31,8 @@ __all__ = ["UMBridgeProblem"]
 _LARGEST = 256_000_000  # bytes of an answer
 _LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})  # reached without a proxy
 _QUICK = 30.0  # s for questions that need no solve
+_PAUSES = (0.5, 2.0, 5.0)  # s before the tries after a lost connection
+_AFTER = "Start it again, and sweep under another name: a case that failed is not solved anew."
 
 
 @dataclass(frozen=True)
@@ -57,9 +60,10 @@ class UMBridgeProblem(MappedProblem):
     def values(self, x: np.ndarray) -> Mapping[str, np.ndarray]:
         """Return the answers of the server for the inputs `x` (n,)."""
         try:
-            cases = self.mapped(x, self.evaluate(x))
+            cases = self.mapped(x, self._patiently(x))
         except PalpateError as error:
-            raise CaseFailure(" ".join(filter(None, (error.what, error.why)))) from error
+            after = _AFTER * isinstance(error, ResourceError)
+            raise CaseFailure(" ".join(filter(None, (error.what, error.why, after)))) from error
         if not bool(cases.finite[0]):
             raise CaseFailure("The model's answer is not a number.")
         return {entry.name: cases.answers[entry.name][0] for entry in cases.fields}
@@ -125,6 +129,17 @@ class UMBridgeProblem(MappedProblem):
             return [[float(value) for value in part] for part in output]
         except (TypeError, ValueError) as error:
             raise UsageError("The model's answer holds what is no number.", why=str(error)) from error
+
+    def _patiently(self, x: np.ndarray) -> list[list[float]]:
+        """Return the model's answer at `x` (n,); a server that is started again within seconds costs nothing."""
+        for pause in _PAUSES:
+            try:
+                return self.evaluate(x)
+            except ResourceError as error:
+                if isinstance(error.__cause__, TimeoutError):  # it has had its time
+                    raise
+                time.sleep(pause)
+        return self.evaluate(x)
 
     def _ask(self, path: str, question: Mapping[str, Any] | None, limit: float) -> dict[str, Any]:
         """Return the server's answer; what it refuses is a `UsageError`, a lost connection a `ResourceError`."""

@@ -197,6 +197,5 @@ def _solves(surrogate: Surrogate, block: ArrayBlock) -> dict[str, Any] | None:
     parts += [f.coefficients for f in surrogate.modal_fields.values()]
     for part in parts:
         if part.region is not None:
-            s = part.network.scaling
-            return block.add(part.region.points * s.input_half + s.input_centre, "f8")
+            return block.add(part.network.scaling.unscale_inputs(part.region.points), "f8")
     return None

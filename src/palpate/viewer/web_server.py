@@ -101,6 +101,7 @@ def _try(host: str, port: int) -> socket.socket | None:
 STATIC = Path(__file__).parent / "static"
 LARGEST_MESSAGE = 4096  # bytes from a page; a Hand with eight parameters has 79
 START = 10.0  # s until the server must listen
+_LOOK = 0.2  # s between two looks whether it has ended
 BACKLOG = 32  # connections that are taken at once, between two looks at what pages sent
 
 
@@ -224,10 +225,11 @@ class LocalServer(ABC):
 
     def wait(self) -> None:
         """Return when the server has ended."""
-        # in steps: a wait without end can't be interrupted on every system. Not by `join`: where Ctrl-C interrupts it,
-        # Python takes the thread for ended, and the listener would be closed under it
-        while not self._ended.wait(0.5):
-            pass
+        # in looks. Not by `join`: where Ctrl-C interrupts it, Python takes the thread for ended, and the listener would
+        # be closed under it. Not by the event's own `wait`: interrupted, it may keep its lock, and the thread that sets
+        # the event would wait for that without an end
+        while not self._ended.is_set():
+            time.sleep(_LOOK)
 
     def __enter__(self) -> Self:
         return self.start()

@@ -77,6 +77,7 @@ def fit(
     outputs: Sequence[Quantity] | None = None,
     *,
     lines: Sequence[int] | None = None,
+    bends: np.ndarray | None = None,
     options: FitOptions,
 ) -> Fitted:
     """Choose and fit a network from samples alone.
@@ -96,6 +97,8 @@ def fit(
     lines : sequence of N int, optional
         Line of each sample in the file that it comes from; notes name a sample by it. By default they name its row
         in X, counted from 0.
+    bends : (n,), optional
+        Bends of the inputs' scales, see `palpate.network.Scaling`; all are straight by default.
 
     Returns
     -------
@@ -123,7 +126,7 @@ def fit(
 
     began = time.monotonic()
     budget, seconds = Budget.of(options.effort, options.seconds), options.seconds
-    samples = Samples.of(X, Y, inputs, outputs, lines)
+    samples = replace(Samples.of(X, Y, inputs, outputs, lines), bends=bends)
     if seconds is not None:  # fitting to all samples and freezing come after the search
         planned = seconds / _PLANNED_SECONDS
         asked = 1.0 if budget.effort == FitOptions().effort else budget.effort

@@ -27,6 +27,10 @@ _SPIKE = 30.0  # times the median error from which a sample may be a spike
 _SPIKE_WEIGHT = 1e-8
 _NEIGHBOURS = 4  # samples that a spike disagrees with
 _ENOUGH = 8  # samples among which spikes are looked for
+_WEIGHT = 1.0  # size of weights where samples say nothing, in scaled outputs
+_CLEARLY = (
+    0.5  # error of weights that may be of any size, over that of moderate ones, below which they are taken
+)
 _FILLED = 0.5  # unknowns per number in the reservoir up to which units are added
 
 
@@ -49,7 +53,7 @@ class Refining:
     share : float
         Units added at a time, relative to those there are; one at least.
     ridge : float
-        Penalty on squared weights, per sample.
+        Least penalty on squared weights, per sample; the error expected of new samples may ask for more.
     judges : int
         One retained sample in so many judges whether moved or added units are better; 0 for none.
     patience : int
@@ -107,13 +111,20 @@ def refined_state(
     weights = kept.weights * settings.forgetting_factor ** (kept.ages - kept.ages.min())
     weights = np.where(_spikes(state, kept, settings), _SPIKE_WEIGHT * weights, weights)
     judging = _judging(kept, weights, refining)
-    penalty = max(refining.ridge, 1e-30)
     rows = _rows(state, kept, settings, np.where(judging, 0.0, weights))
+
+    def judged(penalty: float) -> float:
+        return _error(rows, kept, judging, weights, state.theta, project(rows, state.theta, penalty))
+
+    penalty = max(refining.ridge, 1e-30)
+    before = judged(penalty * rows.total)
+    # of the likeliest weights under noise (MacKay 1992, Neural Computation 4, 415-447): units that nearly cancel do not
+    # follow noise or drift, unless what was held back shows that they are right
+    noise = float(np.nan_to_num(last.expected / _WEIGHT)) ** 2 / rows.total
+    if noise > penalty and _CLEARLY * (calm := judged(noise * rows.total)) < before:
+        penalty, before = noise, calm
     start, damping, new = _start(state, kept, settings, refining, last)
     step = levenberg_step(rows, start, penalty * rows.total, damping=damping, tries=refining.tries)
-    before = _error(
-        rows, kept, judging, weights, state.theta, project(rows, state.theta, penalty * rows.total)
-    )
     after = _error(rows, kept, judging, weights, step.theta, step.fit)
     better = not after > before
     theta = step.theta if better else state.theta

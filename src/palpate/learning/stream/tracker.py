@@ -225,8 +225,10 @@ class Tracker:
         P = np.tensordot(
             self.chances, self.covariances + apart @ apart.transpose(0, 2, 1) / apart.shape[2], 1
         )
-        B = block_diag(np.eye(self.tail), self.inverse)
-        return np.asarray(B @ P @ B.T)
+        # by its root: the inverse would make rounding of P into variances below zero
+        values, directions = np.linalg.eigh(P)
+        root = block_diag(np.eye(self.tail), self.inverse) @ (directions * np.sqrt(np.maximum(values, 0.0)))
+        return np.asarray(root @ root.T)
 
     def predict(self, X: np.ndarray) -> np.ndarray:
         """f (N, m) at X (N, n)."""

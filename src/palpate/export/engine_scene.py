@@ -22,8 +22,8 @@ def require_touch(surrogate: Surrogate) -> None:
 
 def shown_mesh(surrogate: Surrogate) -> FieldSurrogate | None:
     """Return the displacement of a surface that an engine can draw, if the body has one."""
-    field = surrogate.fields.get("displacement")
-    return field if isinstance(field, FieldSurrogate) and field.rest.shape[1] == 3 else None
+    field = surrogate.surface_fields.get("displacement")
+    return field if field is not None and field.rest.shape[1] == 3 else None
 
 
 def probe_radius(surrogate: Surrogate) -> float:

@@ -13,8 +13,10 @@ import pytest
 
 import palpate as pp
 from palpate.dataset import histories_of
+from palpate.learning.loading import load_surrogate
 from palpate.study import Study
 from palpate.study.run import Paths, load_data
+from palpate.viewer.answer_page import AnswerPage
 
 FORMER = Path(__file__).parents[1] / "data" / "former"
 
@@ -52,6 +54,13 @@ def test_numbers_of_before_are_answered_alike(answers):
     rod, fitted = pp.load(FORMER / "answers.palpate"), pp.load(FORMER / "fit.palpate")
     near(rod.predict(answers["answers/numbers/X"]), answers["answers/numbers/values"])
     near(fitted.predict(answers["fit/X"]), answers["fit/values"])
+
+
+def test_a_network_of_before_becomes_a_page_and_answers_as_a_surrogate(answers):
+    surrogate = load_surrogate(FORMER / "fit.palpate")
+    near(surrogate.predict(answers["fit/X"]), answers["fit/values"].reshape(-1, 1))
+    assert not np.isnan(surrogate.deviation(answers["fit/X"])).any()
+    assert 'id="palpate-answers-main"' in AnswerPage.of(surrogate).document()
 
 
 def test_histories_of_before_judge_a_body_of_before(answers):

@@ -222,8 +222,11 @@ def surrogate_answers(surrogate: Surrogate, X: np.ndarray) -> list[Prediction]:
     tells = bool(fields) or any(part.uncertainty is not None or part.region is not None for part in numbers)
     return [
         Prediction(
-            *(x, surrogate.outputs, y),
-            *((s, bool(i)) if tells else (None, None)),
+            x,
+            surrogate.outputs,
+            y,
+            s if tells else None,
+            bool(i) if tells else None,
             tuple(FieldSummary.of(one, x) for one in fields),
         )
         for x, y, s, i in zip(X, surrogate.predict(X), spread, trusted, strict=True)

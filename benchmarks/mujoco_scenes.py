@@ -1,8 +1,7 @@
 """A ball that comes to rest on a soft block in MuJoCo: on MuJoCo's own flex in many settings, and on a learnt body.
 
-The block is the study ``block-centre`` of `benchmarks.touch_studies`: 100 × 100 × 50 mm of 9 kPa and Poisson's ratio 0.45,
-held at its bottom. A ball of 10 mm radius is pushed onto the middle of its top by a weight of 30 g, on a slide with a damper; only
-the ball is heavy, as in the finite-element solve.
+The block is that of `benchmarks.rest_block`. A ball is pushed onto the middle of its top by a weight of 30 g, on a
+slide with a damper; only the ball is heavy, as in the finite-element solve.
 """
 
 from __future__ import annotations
@@ -15,14 +14,13 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["CURE", "WEIGHT", "FlexSetting", "Rest", "palpate_rest", "rest_on_flex"]
+from benchmarks.rest_block import HEIGHT, MASS, POISSON, RADIUS, SIDE, WEIGHT, YOUNG
 
-SIDE, HEIGHT, RADIUS = 0.1, 0.05, 0.01  # m
-YOUNG, POISSON = 9e3, 0.45
-MASS, WEIGHT = 0.03, 0.03 * 9.81  # kg, N
+__all__ = ["FlexSetting", "Rest", "palpate_rest", "rest_on_flex"]
+
 DAMPER = 2.0  # N s/m, of the slide
-CURE = 2.0  # s of the scene until the ball rests
-_PATIENCE = 60.0  # s of the machine for one scene
+_REST = 1.0  # s of the scene until the ball rests
+_PATIENCE = 40.0  # s of the machine for one scene
 _GAP = 2e-4  # m between the ball and the block at the beginning
 _SKIN = 5e-4  # m, radius of a flex's vertices
 
@@ -37,11 +35,10 @@ class FlexSetting:
     solver: str = "CG"
     damping: float = 0.01  # s, of the elasticity
     passive: bool = False  # contact by a spring instead of a constraint
-    dof: str = "full"
 
     def __str__(self) -> str:
         words = [self.mesh, self.integrator, f"{1e3 * self.step:g} ms", self.solver]
-        words += ["passive contact"] * self.passive + [self.dof] * (self.dof != "full")
+        words += ["passive contact"] * self.passive
         return ", ".join(words)
 
 
@@ -54,7 +51,7 @@ class Rest:
     depth : float
         Depth of the ball in the surface at rest, m; not-a-number where it never rested.
     step_seconds : float
-        Time of the machine for one step, the median, s.
+        Time of the machine for one step, the lower quartile, s.
     slower : float
         Time of the machine over time of the scene.
     """
@@ -115,7 +112,7 @@ def _settle(model: Any, data: Any, height: Callable[[], float]) -> Rest:
     times: list[float] = []
     heights: list[float] = []
     begin = time.perf_counter()
-    while data.time < CURE and time.perf_counter() - begin < _PATIENCE:
+    while data.time < _REST and time.perf_counter() - begin < _PATIENCE:
         start = time.perf_counter()
         mujoco.mj_step(model, data)
         times.append(time.perf_counter() - start)
@@ -123,7 +120,7 @@ def _settle(model: Any, data: Any, height: Callable[[], float]) -> Rest:
     tail = heights[-max(2, len(heights) // 20) :]
     depth = -heights[-1]
     rests = math.isfinite(depth) and np.ptp(tail) < 1e-3 * abs(depth) and 0.0 < depth < HEIGHT
-    median = float(np.median(times))
+    median = float(np.percentile(times, 25))  # other work of the machine makes steps longer, never shorter
     return Rest(depth if rests else math.nan, median, median / float(model.opt.timestep))
 
 
@@ -133,7 +130,7 @@ def rest_on_flex(setting: FlexSetting) -> tuple[Rest, int]:
 
     mesh, pins, count = _mesh(setting.mesh)
     passive = 'passive="true"' if setting.passive else ""
-    flex = f"""<flexcomp name="soft" dim="3" {mesh} mass="0.5" radius="{_SKIN}" dof="{setting.dof}">
+    flex = f"""<flexcomp name="soft" dim="3" {mesh} mass="0.5" radius="{_SKIN}">
     <elasticity young="{YOUNG}" poisson="{POISSON}" damping="{setting.damping}"/>
     <contact selfcollide="none" {passive}/><pin {pins}/></flexcomp>"""
     model = mujoco.MjModel.from_xml_string(

@@ -2,7 +2,7 @@
 
     python -m benchmarks.mujoco_flex [--quick] [--record]
 
-The depth is held against that of finite elements. Time is that of a step, and of the machine over that of the scene,
+The depth is held against that of finite elements. Time is that of the processor, for a step and over that of the scene,
 in the same run.
 """
 

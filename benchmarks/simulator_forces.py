@@ -3,7 +3,8 @@
     python -m benchmarks.simulator_forces [--quick] [--record]
 
 Time of a MuJoCo step with the learnt body less that of the same scene without; the energy of an undamped bounce of ten
-seconds; forces a second of a batch in NumPy, and the times of torch and JAX over NumPy's, each in the same run.
+seconds; forces of a batch in NumPy a second and core, and the times of torch and JAX over NumPy's, in the same run. All
+times are those of processors, which other work on the machine lengthens little.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from palpate.surrogates import Surrogate
 __all__ = ["tables"]
 
 _GRAVITY = 9.81  # m/s²
-_STEP_BOUND, _BOUNCE_BOUND, _RATE_BOUND, _SHARE_BOUND = 40.0, 1e-5, 1e6, 2.0
+_STEP_BOUND, _BOUNCE_BOUND, _RATE_BOUND, _SHARE_BOUND = 40.0, 1e-5, 5e5, 2.0
 _ROWS = 100_000
 
 
@@ -68,9 +69,9 @@ def _step_rows(touch: Surrogate, steps: int) -> tuple[list[dict[str, Any]], list
         data, _ = _attached(model, touch, count) if count else (mujoco.MjData(model), [])
         parts = []
         for _ in range(10):
-            start = time.perf_counter()
+            start = time.process_time()
             mujoco.mj_step(model, data, nstep=steps // 10)
-            parts.append((time.perf_counter() - start) / (steps // 10))
+            parts.append((time.process_time() - start) / (steps // 10))
         return min(parts)
 
     free, rows, claims = seconds(0), [], []
@@ -135,9 +136,9 @@ def _least(works: Sequence[Callable[[], object]], rounds: int) -> list[float]:
         work()
     for row in times:
         for k, work in enumerate(works):
-            start = time.perf_counter()
+            start = time.process_time()
             work()
-            row[k] = time.perf_counter() - start
+            row[k] = time.process_time() - start
     return [float(least) for least in times.min(axis=0)]
 
 
@@ -178,9 +179,13 @@ def _batch_rows(touch: Surrogate, count: int, rounds: int) -> tuple[list[dict[st
     works = _batch_works(touch, X)
     own, *others = _least(list(works.values()), rounds)
     rate = count / own
-    rows: list[dict[str, Any]] = [{"what": f"NumPy, force, {count} rows", "value": rate, "unit": "forces/s"}]
+    rows: list[dict[str, Any]] = [
+        {"what": f"NumPy, force, {count} rows", "value": rate, "unit": "forces/s and core"}
+    ]
     claims = [
-        Claim("time of NumPy over that of a million forces a second", (_RATE_BOUND / rate,), 1.0, ".2f")
+        Claim(
+            "time of NumPy over that of 500,000 forces a second and core", (_RATE_BOUND / rate,), 1.0, ".2f"
+        )
     ]
     for what, seconds in zip(list(works)[1:], others, strict=True):
         rows.append({"what": what, "value": seconds / own, "unit": "of NumPy's time"})

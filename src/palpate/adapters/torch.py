@@ -102,7 +102,7 @@ class TorchBody:
                 fix="Convert them, or make the body with that dtype.",
             )
         if name in SLOPES and self.dtype == torch.float64 and x.device.type == "cpu":
-            return self._kernels.apply(x, name)
+            return self._kernels.apply(x, name)[0]
         return self._run_program(name, x)
 
     def _run_program(self, name: str, x: Any) -> Any:

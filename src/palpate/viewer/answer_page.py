@@ -122,6 +122,7 @@ def _modes(shown: ModalField, rows: np.ndarray, block: ArrayBlock) -> dict[str, 
         "modes": block.add(shown.modes[:, rows], "f4"),
         "scatter": block.add(shown.scatter[rows], "f4"),
         "widening": None if np.isnan(shown.widening) else shown.widening,
+        "solved": None if shown.solved is None else block.add(shown.solved),
     }
 
 
@@ -193,6 +194,9 @@ def _scales(shown: ModalField, values: np.ndarray) -> Iterator[dict[str, Any]]:
 
 def _solves(surrogate: Surrogate, block: ArrayBlock) -> dict[str, Any] | None:
     """Return the inputs (N, n) of the solves that were learnt from, where a part holds them."""
+    for shown in surrogate.fields.values():
+        if isinstance(shown, ModalField) and shown.solved_at is not None:
+            return block.add(shown.solved_at, "f8")
     parts: list[LearntQuantities] = list(surrogate.quantities.values())
     parts += [f.coefficients for f in surrogate.modal_fields.values()]
     for part in parts:

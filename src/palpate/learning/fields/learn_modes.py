@@ -160,7 +160,7 @@ def learn_modes(
     }
     coefficients = next(iter(fitted.surrogate().quantities.values()))
     parts = (coefficients, mean, modes, scatter, widening, tuple(components), meta)
-    field = ModalField(name, unit, places, *parts)
+    field = ModalField(name, unit, places, *parts, solved_at=X, solved=along)
     return LearntModes(field, fitted, sizes)
 
 

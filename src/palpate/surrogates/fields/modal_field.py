@@ -54,6 +54,10 @@ class ModalField(Field):
         JSON-able record of its training: ``truncation`` and ``truncation_left_out`` (root mean square that the modes
         miss, of the solves learnt from and of others), ``left_out_p95`` (95th percentile of the error over places and
         solves left out) and ``range`` (largest less least value), in the field's unit.
+    solved_at : (N, n), optional
+        Inputs of the solves that it was learnt from, SI units.
+    solved : (N, k), optional
+        Coefficients of these solves in the modes: what was solved, up to what the modes miss.
 
     Raises
     ------
@@ -73,11 +77,17 @@ class ModalField(Field):
     widening: float = 1.0
     components: tuple[str, ...] = ()
     meta: Mapping[str, Any] = field(default_factory=dict)
+    solved_at: np.ndarray | None = None
+    solved: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        own_arrays(self, "mean", "modes", "scatter")
+        own_arrays(self, "mean", "modes", "scatter", "solved_at", "solved")
         k, shape = len(self.coefficients.outputs), (len(self.places), max(1, len(self.components)))
         fits = self.mean.shape == self.scatter.shape == shape and self.modes.shape == (k, *shape)
+        at, solved = self.solved_at, self.solved
+        fits &= (at is None) == (solved is None)
+        if at is not None and solved is not None:
+            fits &= at.shape == (len(solved), len(self.inputs)) and solved.shape[1:] == (k,)
         if not (fits and all(np.isfinite(a).all() for a in (self.mean, self.modes, self.scatter))):
             raise UsageError(
                 f"The field {self.name!r} can't be made of {k} coefficients and modes {self.modes.shape}.",

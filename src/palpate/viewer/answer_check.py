@@ -20,7 +20,7 @@ from palpate.export.check_points import Comparison, Difference, Precision, diffe
 from palpate.network import Network, Scaling, TrainedRegion
 from palpate.network.influence import Influence
 from palpate.network.uncertainty import Uncertainty
-from palpate.surrogates import LearntQuantities, MeshPlaces, ModalField, Surrogate
+from palpate.surrogates import LearntQuantities, ModalField, Surrogate
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["compare_page"]
@@ -55,8 +55,7 @@ def compare_page(surrogate: Surrogate, parts: Mapping[str, str]) -> Comparison:
         name = ", ".join(q.name for q in own.outputs)
         found |= dict(_numbers(name, own, _group(told, inputs, read), X))
     for told in (*facts["curves"], *facts["fields"]):
-        shown = surrogate.fields[told["name"]]
-        assert isinstance(shown, ModalField)
+        shown = surrogate.modal_fields[told["name"]]
         coefficients = _group(told["coefficients"], inputs, read)
         found |= dict(_numbers(f"{shown.name}, coefficients", shown.coefficients, coefficients, X))
         found[shown.name] = _field(shown, told, coefficients, read, X)
@@ -106,8 +105,8 @@ def _field(
 ) -> Difference:
     """Return the difference of a field or curve at the places that the page draws."""
     rows = np.arange(len(shown.places))
-    if isinstance(shown.places, MeshPlaces):
-        rows = np.unique(shown.places.triangles if shown.places.kind == "nodes" else shown.places.cell_of)
+    if (mesh := shown.mesh) is not None:
+        rows = np.unique(mesh.triangles if mesh.kind == "nodes" else mesh.cell_of)
     some = X[: max(20, _NUMBERS // max(1, rows.size * shown.mean.shape[1]))]
     mean, modes = (read(told[name]).astype(float) for name in ("mean", "modes"))
     got = mean + np.tensordot(coefficients.predict(some), modes, 1)

@@ -194,8 +194,8 @@ def _scales(shown: ModalField, values: np.ndarray) -> Iterator[dict[str, Any]]:
 
 def _solves(surrogate: Surrogate, block: ArrayBlock) -> dict[str, Any] | None:
     """Return the inputs (N, n) of the solves that were learnt from, where a part holds them."""
-    for shown in surrogate.fields.values():
-        if isinstance(shown, ModalField) and shown.solved_at is not None:
+    for shown in surrogate.modal_fields.values():
+        if shown.solved_at is not None:
             return block.add(shown.solved_at, "f8")
     parts: list[LearntQuantities] = list(surrogate.quantities.values())
     parts += [f.coefficients for f in surrogate.modal_fields.values()]

@@ -32,6 +32,7 @@ BENCHMARKS = (
     "latency",
     "literature",
     "mujoco_flex",
+    "newton_balls",
     "online",
     "page_speed",
     "peers",

@@ -46,6 +46,7 @@ def tables(*, quick: bool) -> list[Table]:
         )
     for setting in SETTINGS[:1] if quick else SETTINGS:
         rest, count = rest_on_flex(setting)
+        print(setting, rest, file=sys.stderr, flush=True)
         error = 100.0 * (rest.depth / depth - 1.0)
         rows.append(_row(f"flex, {setting}", count, rest.depth, error, rest.step_seconds, rest.slower))
     best = min((abs(r["error"]) for r in rows[len(claims) :] if math.isfinite(r["error"])), default=math.nan)

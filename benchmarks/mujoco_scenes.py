@@ -19,7 +19,7 @@ from benchmarks.rest_block import HEIGHT, MASS, POISSON, RADIUS, SIDE, WEIGHT, Y
 __all__ = ["FlexSetting", "Rest", "palpate_rest", "rest_on_flex"]
 
 DAMPER = 2.0  # N s/m, of the slide
-_REST = 1.0  # s of the scene until the ball rests
+_REST = 0.5  # s of the scene: thirty times the time in which the damper lets the ball settle
 _PATIENCE = 25.0  # s of the processor for one scene
 _GAP = 2e-4  # m between the ball and the block at the beginning
 _SKIN = 5e-4  # m, radius of a flex's vertices

@@ -34,6 +34,7 @@ BENCHMARKS = (
     "latency",
     "literature",
     "mujoco_flex",
+    "newton_balls",
     "online",
     "page_speed",
     "peers",

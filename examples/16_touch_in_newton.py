@@ -1,12 +1,11 @@
 """Sixteen balls come to rest on a learnt block in Newton: one batch of forces a step, added to `State.body_f`.
 
-The block is fixed and without inertia, the balls rigid, and none feels the others. Newton compiles its kernels at the first
-run, for minutes. On a GPU the forces stay there: TorchBody answers on the device that its tensors are on.
+The block is fixed and without inertia, the balls rigid, and none feels the others. Newton compiles its kernels at the
+first run, for minutes. On a GPU the forces stay there: TorchBody answers on the device that its tensors are on.
 """
 
 import newton
 import numpy as np
-import torch
 import warp as wp
 
 import palpate as pp

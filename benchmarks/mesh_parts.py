@@ -27,7 +27,7 @@ from palpate.validation.figures.mesh_error import WHOLE, part_of_mesh
 
 __all__ = ["mesh_parts"]
 
-TOUCHES, STATED, OTHERS = 16, 3, 8  # unseen touches; those that state the part, and that judge the statement
+TOUCHES, STATED, OTHERS = 10, 3, 5  # unseen touches; those that state the part, and that judge the statement
 
 
 def mesh_parts(study: Study) -> tuple[float, float]:

@@ -433,7 +433,9 @@ class _Chooser:
         """Return the networks of the best kind, learnt crosswise: the winner's, or a rival's if work allows."""
         best = self._learn_crosswise(winner)
         for rival in self._rivals(winner) if best is not None and not self.quick else ():
-            if self.work.left < 1.3 * _CROSSED_ROUNDS * _CROSSED_FOLDS * self._fresh(rival).work(self.split):
+            if self.work.left < 1.3 * _CROSSED_ROUNDS * _CROSSED_FOLDS * Fresh(
+                rival, self.scales, self.budget.deadline
+            ).work(self.split):
                 break
             other = self._learn_crosswise(self._run([rival], rival.iterations, self.split, record=False)[0])
             if other is not None and best is not None and other.error < best.error:
@@ -453,7 +455,7 @@ class _Chooser:
 
         Each stops by other samples than those that it is judged by: on a handful the best iterate is there by luck.
         """
-        fresh = self._fresh(winner)
+        fresh = Fresh(winner, self.scales, self.budget.deadline)
         most = 1 if self.quick else _CROSSED_ROUNDS
         rounds = min(most, int(self.work.left / (1.1 * _CROSSED_FOLDS * fresh.work(self.split))))
         if rounds < 1:
@@ -482,9 +484,6 @@ class _Chooser:
             self._scaled_trial(replace(winner.trial, start="mean", units=units, error=crossed.error))
         )
         return crossed
-
-    def _fresh(self, like: Candidate) -> Fresh:
-        return Fresh(like, self.scales, self.budget.deadline)
 
     def _refine_afresh(self, fresh: Fresh, splits: Sequence[HeldOut]) -> list[Candidate | None]:
         seeds = [self.seed + k for k in range(1, len(splits) + 1)]

@@ -33,6 +33,7 @@ from .physics import Rectangle as Rectangle
 from .physics import Section as Section
 from .physics import SphereProbe as SphereProbe
 from .physics import StepAndHold as StepAndHold
+from .physics import SurfaceTool as SurfaceTool
 from .physics import SurfaceTraction as SurfaceTraction
 from .physics import TipLoad as TipLoad
 from .physics import Varied as Varied
@@ -40,6 +41,7 @@ from .physics import materials as materials
 from .physics import named_material as named_material
 from .physics import roller as roller
 from .physics import shapes as shapes
+from .physics import tools as tools
 from .study import Study as Study
 from .study import preset_study as preset_study
 from .study import read_study as read_study

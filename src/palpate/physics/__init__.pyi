@@ -5,6 +5,7 @@ from . import interactions as interactions
 from . import materials as materials
 from . import shapes as shapes
 from . import solid as solid
+from . import tools as tools
 from .advice import ModelWarning as ModelWarning
 from .beam import HISTORY_PRESETS as HISTORY_PRESETS
 from .beam import PRESETS as PRESETS
@@ -28,6 +29,7 @@ from .interactions import PointForce as PointForce
 from .interactions import PrescribedDisplacement as PrescribedDisplacement
 from .interactions import Pressure as Pressure
 from .interactions import SphereProbe as SphereProbe
+from .interactions import SurfaceTool as SurfaceTool
 from .interactions import SurfaceTraction as SurfaceTraction
 from .interactions import pad_share as pad_share
 from .interactions import roller as roller

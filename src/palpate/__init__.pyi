@@ -2,6 +2,7 @@
 
 __version__: str
 
+from . import tools as tools
 from .dataset import Dataset as Dataset
 from .dataset import Field as Field
 from .dataset import Layout as Layout
@@ -41,7 +42,6 @@ from .physics import materials as materials
 from .physics import named_material as named_material
 from .physics import roller as roller
 from .physics import shapes as shapes
-from .physics import tools as tools
 from .study import Study as Study
 from .study import preset_study as preset_study
 from .study import read_study as read_study

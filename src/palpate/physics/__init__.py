@@ -2,7 +2,6 @@
 
     shapes        shapes and their meshes, made or imported
     materials     what a body is made of, as energies
-    tools         shapes of rigid tools, as signed distances
     interactions  what acts on it, as energies with inputs
     solid         solid bodies in three dimensions
     beam          plane cantilevers

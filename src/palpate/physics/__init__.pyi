@@ -5,7 +5,6 @@ from . import interactions as interactions
 from . import materials as materials
 from . import shapes as shapes
 from . import solid as solid
-from . import tools as tools
 from .advice import ModelWarning as ModelWarning
 from .beam import HISTORY_PRESETS as HISTORY_PRESETS
 from .beam import PRESETS as PRESETS

@@ -11,7 +11,7 @@ from palpate.physics.interactions import SphereProbe
 from palpate.physics.interactions.tool_contact import Contact
 from palpate.physics.shapes.surface_checks import winding_number
 from palpate.physics.stop import Stop
-from palpate.physics.tools import Sphere
+from palpate.tools import Sphere
 
 
 def test_a_corner_turned_over_between_the_quadrature_points_is_seen():

@@ -28,7 +28,7 @@ from palpate.units import Range
 if TYPE_CHECKING:
     from palpate.physics.interactions.tool_contact import Contact
     from palpate.physics.shapes.shape import Geometry
-    from palpate.physics.tools import Tool
+    from palpate.tools import Tool
 
 __all__ = ["Corner", "PressingTool", "checked_box"]
 

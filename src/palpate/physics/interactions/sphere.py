@@ -14,7 +14,7 @@ from palpate.format import millimetres, number
 from palpate.physics.interactions.interaction_checks import range_of
 from palpate.physics.interactions.pressing import Corner, PressingTool, checked_box
 from palpate.physics.interactions.surface_patch import Patch
-from palpate.physics.tools import Sphere
+from palpate.tools import Sphere
 
 if TYPE_CHECKING:
     from palpate.physics.shapes.shape import Geometry

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -16,7 +15,7 @@ from palpate.physics.interactions.interaction_checks import range_of
 from palpate.physics.interactions.pressing import Corner, PressingTool, checked_box
 from palpate.physics.interactions.sphere import RIGID, require_pad
 from palpate.physics.interactions.surface_patch import Patch
-from palpate.physics.tools import Tool
+from palpate.tools import PosedTool, Tool
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -81,16 +80,10 @@ class SurfaceTool(PressingTool):
     letter = "p"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.shape, Tool):
-            raise UsageError(
-                f"The shape of a tool is {self.shape!r}.",
-                why="It is one of palpate.tools: Sphere, Capsule, Cylinder, Punch, Cone, Box, Fingertip.",
-                fix="For example SurfaceTool(pp.tools.Capsule(radius=0.006, length=0.03)).",
-            )
+        object.__setattr__(self, "rotation", self.posed.rotation)
         if self.pad != RIGID:
             require_pad(self.pad)
         object.__setattr__(self, "depth", range_of("The depth of a tool", self.depth, "m"))
-        object.__setattr__(self, "rotation", checks.triple("The rotation of a tool", self.rotation, "rad"))
         if self.over is not None:
             object.__setattr__(self, "over", checked_box(self.over))
         if self.element is not None:
@@ -98,15 +91,12 @@ class SurfaceTool(PressingTool):
         self.require_resolved(self._size_of_elements())
 
     def __str__(self) -> str:
-        turned = ""
-        if self.turn is not None:
-            turned = f", turned by {math.degrees(float(np.linalg.norm(self.rotation))):.3g}°"
         pad = "rigid" if isinstance(self.pad, str) else f"pad {number(self.pad)} N/m³"
-        return f"{self.shape}{turned} on {self.touches!r}, {pad}"
+        return f"{self.posed} on {self.touches!r}, {pad}"
 
     def describe(self) -> dict[str, Any]:
         """Return everything that decides its energy, as plain data for a JSON file."""
-        return {**super().describe(), "shape": self.shape.describe()}
+        return {**super().describe(), **self.posed.describe()}
 
     @property
     def stop(self) -> float | None:
@@ -114,31 +104,23 @@ class SurfaceTool(PressingTool):
         return None if self.pad == RIGID else min(STOP, self.shape.least_radius)
 
     @property
+    def posed(self) -> PosedTool:
+        """The tool in its orientation."""
+        return PosedTool(self.shape, self.rotation)
+
+    @property
     def turn(self) -> np.ndarray | None:
         """Rotation (3, 3) from the tool's frame to the body's; None for none."""
-        if not any(self.rotation):
-            return None
-        from scipy.spatial.transform import Rotation
-
-        return np.asarray(Rotation.from_rotvec(self.rotation).as_matrix())
+        return self.posed.turn
 
     @property
     def to_centre(self) -> np.ndarray:
         """Way (3,) in m from the tool's place to its shape's centre."""
-        own = np.array([0.0, 0.0, self.shape.front])
-        return own if self.turn is None else self.turn @ own
+        return self.posed.to_centre
 
     def offset(self, normals: np.ndarray) -> np.ndarray:
         """Return how high (N,) in m the place is above a plane of unit normals (N, 3) that the tool just touches."""
-        into = -normals if self.turn is None else -normals @ self.turn
-        reach = self.shape.support(into)
-        if not np.isfinite(reach).all():
-            raise UsageError(
-                f"The side of the {self.shape} would lie on the surface {self.touches!r}.",
-                why="Its foremost point does not touch first: the tool is turned too far from the surface's normal.",
-                fix="Turn it less, or give another rotation: it is a rotation vector in rad.",
-            )
-        return np.asarray(reach - normals @ self.to_centre)
+        return self.posed.reach(normals) - normals @ self.to_centre
 
     def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
         """Return the ranges of p_x, p_y and p_z in m: the box around all its places."""

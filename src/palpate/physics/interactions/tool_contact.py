@@ -26,7 +26,7 @@ from palpate.physics.interactions.surface_patch import Patch
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.surface_checks import winding_number
 from palpate.physics.stop import Stop, Verdict
-from palpate.physics.tools import Tool
+from palpate.tools import Tool
 
 __all__ = ["REACH", "Contact", "pad_energy", "pressed_energy"]
 

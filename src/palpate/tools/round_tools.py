@@ -11,7 +11,7 @@ import numpy as np
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.format import millimetres
-from palpate.physics.tools.tool_shape import Tool, length, norm, parts, positive, where_positive
+from palpate.tools.tool_shape import Tool, length, norm, parts, positive, where_positive
 
 __all__ = ["Capsule", "Cone", "Fingertip", "Sphere"]
 

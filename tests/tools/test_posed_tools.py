@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from palpate import tools
 from palpate.errors import UsageError
-from palpate.physics import Body, SphereProbe, SurfaceTool, tools
+from palpate.physics import Body, SphereProbe, SurfaceTool
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block
 

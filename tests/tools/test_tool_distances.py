@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from palpate import tools
 from palpate.errors import UsageError
-from palpate.physics import tools
 
 SHAPES = [
     tools.Sphere(0.010),

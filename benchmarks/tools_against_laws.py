@@ -1,7 +1,7 @@
 """Tools' signed distances and pads beside laws of contact, and bodies in three dimensions beside axisymmetric solves.
 
     python -m benchmarks.tools_against_laws             tools on a linear half-space: force by the law of its profile
-    python -m benchmarks.tools_against_laws --solid     as well a cylinder in three dimensions beside its axisymmetric solve
+    python -m benchmarks.tools_against_laws --solid     and a cylinder in three dimensions beside its axisymmetric solve
 
 For a frictionless tool of revolution with the profile f(r) on a half-space of modulus E* = E/(1 − ν²), a contact of
 radius c has the depth and the force (Sneddon 1965, Int. J. Eng. Sci. 3, 47-57)
@@ -9,8 +9,8 @@ radius c has the depth and the force (Sneddon 1965, Int. J. Eng. Sci. 3, 47-57)
     δ = c ∫ f'(c sin t) dt        F = 2 E* c² ∫ sin²t f'(c sin t) dt        0 ≤ t ≤ π/2.
 
 So the sphere is Hertz's but for its true arc, a punch with a sharp edge Boussinesq's 2 E* c δ, and the rounded punch
-its own. A cylinder that lies down has no law of force and depth, but a half width b² = 4 F' R/(π E*) under a force F' per
-length (Hertz 1882; Johnson 1985, eq. 4.43). The half-space ends in held sides at 400 contact radii, which is 0.5 %.
+its own. A cylinder that lies down has no law of force and depth, but a half width b² = 4 F' R/(π E*) under a force F'
+per length (Hertz 1882; Johnson 1985, eq. 4.43). The half-space ends in held sides at 400 contact radii, which is 0.5 %.
 
 The solves here are plain NGSolve; what they take from palpate are the tools' distances and the energy of the pad. Two
 pads give the rigid limit, since all is linear in 1/k but for a second order.
@@ -27,7 +27,7 @@ import numpy as np
 
 from palpate import tools
 
-__all__ = ["TOOLS", "half_width_error", "law_force", "pushes", "solid_errors", "tool_error"]
+__all__ = ["MODULUS", "TOOLS", "A", "half_width_error", "law_force", "pushes", "solid_errors", "tool_error"]
 
 YOUNG, POISSON = 9e3, 0.45  # Pa, 1
 MODULUS = YOUNG / (1 - POISSON**2)

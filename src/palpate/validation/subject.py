@@ -21,7 +21,9 @@ from palpate.learning.learn_dataset import LearningHistory, filter_record
 from palpate.learning.plastic import LoadHistories
 from palpate.network import TrainedRegion
 from palpate.surrogates import LearntEnergy, NodeField, Surrogate
+from palpate.surrogates.baselines import ToolBaseline
 from palpate.surrogates.fields.field_surrogate import FieldSurrogate
+from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
 
@@ -202,6 +204,14 @@ def _refuse_radius(energy: LearntEnergy | None, data: Dataset | TouchSolves) -> 
         return
     own = energy.baseline.radius
     acting = data.provenance.get("problem", {}).get("interactions", [])
+    tool = energy.baseline.posed if isinstance(energy.baseline, ToolBaseline) else None
+    tools = [PosedTool.of(a) for a in acting if isinstance(a, dict) and a.get("type") == "SurfaceTool"]
+    if any(one != tool for one in tools) or (tool is not None and not tools):
+        raise UsageError(
+            f"The solves were made with {tools[0] if tools else 'another probe'}, the surrogate with "
+            f"{energy.baseline.probe_words}.",
+            fix="Test with solves of the tool that the surrogate was learnt with.",
+        )
     radii = [a["radius"] for a in acting if isinstance(a, dict) and "radius" in a]
     if any(abs(r - own) > RADIUS * own for r in radii):
         raise UsageError(

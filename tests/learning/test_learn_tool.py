@@ -18,7 +18,8 @@ from palpate.validation import TouchSolves
 from palpate.viewer.page_model import PageModel
 from pressed import DEEPEST, RADIUS
 
-WAY = np.array([0.0, 0.0, RADIUS])
+# from the place to the ball's centre, and to where the dataset's mesh has its plane
+WAY = np.array([-0.1, -0.1, RADIUS])
 
 
 def under(tool: PosedTool, touches: str = "top", count: int = 60) -> Dataset:
@@ -62,7 +63,7 @@ def test_its_file_answers_the_same_and_names_the_tool(ball, tmp_path):
 def test_a_hand_feels_it_at_the_foremost_point(ball):
     body = touchable(ball)
     assert abs(body.home[2]) < 2e-6  # the plane z = 0, as true as its distance
-    hand, place = body.evaluator(), np.array([0.002, 0.001, -0.003])
+    hand, place = body.evaluator(), np.array([0.102, 0.101, -0.003])
     hand.place(place, holding=True, believed=True)
     hand(place, np.zeros(0))
     np.testing.assert_allclose(hand.force, ball.energy.force(place[None])[0], rtol=1e-9)

@@ -144,7 +144,7 @@ def test_a_rigid_tool_gets_its_pad_from_the_body():
     tool = SurfaceTool(tools.Punch(0.006, 0.002), pad="rigid", depth=(0.0, 0.004))
     acting = BODY.problem(tool).acting[0]
     modulus = 9e3 / (1 - 0.45**2)
-    assert acting.pad * tool.shape.footprint(0.002)[0] / modulus == pytest.approx(75, rel=0.01)
+    assert acting.pad * tool.shape.half_widths(0.002)[0] / modulus == pytest.approx(75, rel=0.01)
     assert acting.stop is None
     assert "rigid" in str(tool)
 

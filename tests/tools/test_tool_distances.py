@@ -71,7 +71,7 @@ def test_outside_it_is_the_distance_to_the_surface(shape):
 def test_the_cut_is_as_wide_as_its_half_widths_say(shape, share):
     """At the end of each half width, at the depth of the cut, the distance is zero."""
     depth = share * shape.least_radius if not isinstance(shape, tools.Cone) else 3 * share * shape.tip
-    half_x, half_y = shape.footprint(depth)
+    half_x, half_y = shape.half_widths(depth)
     ends = np.array([[half_x, 0, depth - shape.front], [0, half_y, depth - shape.front]])
     np.testing.assert_allclose(shape.distance(ends), 0.0, atol=1e-9)
 

@@ -1,6 +1,6 @@
 """Shapes of rigid tools that press a body, as signed distances.
 
-    tool_shape    what every tool offers, and the functions that their distances are made of
+    tool_shape    the base of all tools, and the functions that their distances are made of
     round_tools   Sphere, Capsule, Fingertip, Cone
     edged_tools   Punch, Cylinder, Box
     posed_tool    a tool in an orientation, and how it is written to files

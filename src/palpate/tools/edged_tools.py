@@ -72,7 +72,7 @@ class Punch(Tool):
         """The radius in m."""
         return self.radius
 
-    def footprint(self, depth: float) -> tuple[float, float]:
+    def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and y of the cut at a depth in m."""
         half = self.radius - self.edge + _round_edge(self.edge, depth)
         return half, half
@@ -143,7 +143,7 @@ class Cylinder(Tool):
         """The radius in m, or half the length where that is less."""
         return min(self.radius, self.length / 2)
 
-    def footprint(self, depth: float) -> tuple[float, float]:
+    def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and y of the cut at a depth in m."""
         depth = min(depth, self.radius)
         across = math.sqrt(depth * (2 * self.radius - depth))
@@ -218,7 +218,7 @@ class Box(Tool):
         """Half the shortest side in m."""
         return min(self._halves)
 
-    def footprint(self, depth: float) -> tuple[float, float]:
+    def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and y of the cut at a depth in m."""
         inset = self.edge - _round_edge(self.edge, depth)
         return self.size_x / 2 - inset, self.size_y / 2 - inset

@@ -62,7 +62,7 @@ class Sphere(Tool):
         """The radius in m."""
         return self.radius
 
-    def footprint(self, depth: float) -> tuple[float, float]:
+    def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and y of the cut at a depth in m."""
         half = _half_chord(self.radius, depth)
         return half, half
@@ -129,7 +129,7 @@ class Capsule(Tool):
         """The radius in m."""
         return self.radius
 
-    def footprint(self, depth: float) -> tuple[float, float]:
+    def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and y of the cut at a depth in m."""
         half = _half_chord(self.radius, depth)
         return self._half + half, half
@@ -201,7 +201,7 @@ class Fingertip(Tool):
         """Half the shortest length in m."""
         return min(self._axes)
 
-    def footprint(self, depth: float) -> tuple[float, float]:
+    def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and y of the cut at a depth in m."""
         a, b, c = self._axes
         share = _half_chord(c, depth) / c
@@ -267,7 +267,7 @@ class Cone(Tool):
         """Twice the tip's radius in m."""
         return 2 * self.tip
 
-    def footprint(self, depth: float) -> tuple[float, float]:
+    def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and y of the cut at a depth in m."""
         # the side leaves the tip at the height 1 − sin(half angle) of its radius
         sine, cosine = math.sin(self.half_angle), math.cos(self.half_angle)

@@ -1,4 +1,4 @@
-"""What every tool offers: its signed distance, its support function and its sizes.
+"""The base of all tools: signed distance, support function and sizes.
 
 A distance is written once, with the functions below, for arrays of NumPy and for coefficient functions of NGSolve. It
 is negative inside. Outside and near the surface its gradient is a unit vector that varies continuously; deep inside, it
@@ -97,7 +97,7 @@ class Tool:
         """Length in m that elements and steps are measured by: the radius, or half of a face's shorter side."""
         raise NotImplementedError
 
-    def footprint(self, depth: float) -> tuple[float, float]:
+    def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and along y of the cut at a depth in m above the foremost point."""
         raise NotImplementedError
 

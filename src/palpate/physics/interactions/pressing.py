@@ -1,4 +1,4 @@
-"""What a rigid tool does that presses a surface without friction: its places, its way there, its contact energy.
+"""Rigid tools that press a surface without friction: their places, their way there, their contact energy.
 
 A tool has a fixed orientation, and the three coordinates of its place are the inputs. What is a tool's place, and how
 high above its contact point that is, the tool says itself: of a `SphereProbe` it is the centre.

@@ -128,7 +128,13 @@ class SurfaceTool(PressingTool):
         return super().ranges(geometry)
 
     def require_resolved(self, element: float) -> None:
-        """Refuse elements of a size in m that are too large for the tool's edge."""
+        """Refuse elements of a size in m that are too large for the tool's edge.
+
+        Raises
+        ------
+        UsageError
+            With the edge and the element size that would do.
+        """
         edge = self.shape.least_radius
         if element <= EDGE_ELEMENT * edge * (1 + 1e-9):
             return
@@ -142,7 +148,7 @@ class SurfaceTool(PressingTool):
 
     def contact_radius(self, depth: float) -> float:
         """Return half the lesser width in m of the cut at a depth in m."""
-        return min(self.shape.footprint(depth))
+        return min(self.shape.half_widths(depth))
 
     def _size_of_elements(self) -> float:
         if self.element is not None:
@@ -155,7 +161,7 @@ class SurfaceTool(PressingTool):
 
     def _half_widths(self) -> np.ndarray:
         """Return half the widths (2,) in m of the cut at the largest depth; turned, of the circle around it."""
-        half = np.array(self.shape.footprint(max(self.depth)))
+        half = np.array(self.shape.half_widths(max(self.depth)))
         return half if self.turn is None else np.full(2, np.linalg.norm(half))
 
     @property
@@ -174,7 +180,7 @@ class SurfaceTool(PressingTool):
         across = [i for i in range(3) if i != int(np.argmax(np.abs(patch.facing)))]
         room, needed = (
             float((high - low)[across].min()),
-            2 * float(min(self.shape.footprint(max(self.depth)))),
+            2 * float(min(self.shape.half_widths(max(self.depth)))),
         )
         if needed <= room:
             return

@@ -10,6 +10,7 @@ stability   regressions of the pure filter over many orders of presentation and 
 runtime     the 1 kHz loop in its own process: CPU time of a tick, and lateness
 scale       fits to many rows beside a perceptron and boosted trees
 sweep       solves per second, serial and on the local Dask cluster
+tools_against_laws  tools beside laws of contact and axisymmetric solves
 touching    a sphere on a block: a sweep beside a plain NGSolve script, the mesh's imprint, nearly incompressible tissue
 touching_cost  time and memory of one Newton iteration over the number of unknowns
 

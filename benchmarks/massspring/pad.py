@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.physics.interactions.sphere_contact import REACH, pressed_energy
+from palpate.physics.interactions.tool_contact import REACH, pressed_energy
 
 __all__ = ["PointPad", "point_areas"]
 

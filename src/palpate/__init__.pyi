@@ -2,6 +2,7 @@
 
 __version__: str
 
+from . import tools as tools
 from .dataset import Dataset as Dataset
 from .dataset import Field as Field
 from .dataset import Layout as Layout
@@ -33,6 +34,7 @@ from .physics import Rectangle as Rectangle
 from .physics import Section as Section
 from .physics import SphereProbe as SphereProbe
 from .physics import StepAndHold as StepAndHold
+from .physics import SurfaceTool as SurfaceTool
 from .physics import SurfaceTraction as SurfaceTraction
 from .physics import TipLoad as TipLoad
 from .physics import Varied as Varied

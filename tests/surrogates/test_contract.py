@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import json
 
 import numpy as np
 import pytest
 from surrogate_checks import CHECKS, MEMORY_CHECKS, Example
 from test_pad_energy import made as pad_energy
-from touch_made import around_points, overlap_baseline, touch_energy, undisturbed
+from touch_made import BOX, RADIUS, around_points, overlap_baseline, plane, touch_energy, undisturbed
 
 import palpate as pp
 from models import linear_network
@@ -19,14 +20,16 @@ from palpate.network.kinds import registered_kinds
 from palpate.surrogates import (
     Compiled,
     ConstantBaseline,
+    ContactLaw,
     LearntEnergy,
     PadBaseline,
     RestStiffness,
     Stiffening,
 )
-from palpate.surrogates.baselines import registered_baselines
+from palpate.surrogates.baselines import ToolBaseline, deepest_ball, registered_baselines
 from palpate.surrogates.energy_kernels import entry_of
 from palpate.surrogates.memories import Indentation, IwanElements, Memory, Patches, Relaxation
+from palpate.tools import Capsule, PosedTool
 
 INF = np.inf
 
@@ -47,6 +50,23 @@ def overlap() -> Example:
     rest = around_points(100)
     rest[:, 2] += 0.03
     return Example(pp.Surrogate(energy), rest, undisturbed(energy, around_points(1500), 1e-4))
+
+
+@functools.cache
+def tool() -> Example:
+    """A tilted capsule on a plane, by its place."""
+    posed = PosedTool(Capsule(0.006, 0.03), (0.1, 0.05, 0.0))
+    radius, way = deepest_ball(posed, np.array([0.0, 0.0, 1.0]))
+    # the box is that of a ball of 10 mm
+    way = way + np.array([0.0, 0.0, RADIUS - radius])
+    moved = [pp.Range(f"p{r.name[1:]}", r.low - w, r.high - w, "m") for r, w in zip(BOX, way, strict=True)]
+    frame = plane().frame - np.concatenate([way, np.zeros(len(plane().frame) - 3)])
+    surface = dataclasses.replace(plane(), frame=frame)
+    baseline = ToolBaseline(ContactLaw("series", 1e-3), surface, RADIUS, tool=json.dumps(posed.describe()))
+    energy = touch_energy(box=moved, baseline=baseline)
+    rest = around_points(100) - way
+    rest[:, 2] += 0.03
+    return Example(pp.Surrogate(energy), rest, undisturbed(energy, around_points(1500) - way, 1e-4))
 
 
 @functools.cache
@@ -89,7 +109,7 @@ def _region(n: int) -> TrainedRegion:
     return TrainedRegion.of(np.random.default_rng(1).uniform(-1.0, 1.0, (200, n)))
 
 
-BODIES = (contact, overlap, pad, node, constant)
+BODIES = (contact, overlap, tool, pad, node, constant)
 
 
 def relaxation(q: float) -> Memory:

@@ -92,10 +92,10 @@ def overlap_baseline(weight: float = 1.0) -> OverlapBaseline:
 
 
 def touch_energy(
-    *, extra=(), surface=None, law=None, seed=1, deep=True, radius_at=None, **more
+    *, box=BOX, extra=(), surface=None, law=None, seed=1, deep=True, radius_at=None, **more
 ) -> LearntEnergy:
-    """A touched body with the inputs of `BOX` and `extra`, trained at random points of them."""
-    inputs = [*BOX, *extra]
+    """A touched body with the inputs of a box and `extra`, trained at random points of them."""
+    inputs = [*box, *extra]
     net = network(inputs, seed=seed, **{k: more.pop(k) for k in ("units", "size") if k in more})
     rng = np.random.default_rng(seed)
     parts = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -26,7 +27,8 @@ from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_re
 from palpate.learning.recognised import Recognised, Request, recogniser
 from palpate.options import FieldOptions
 from palpate.surrogates import Baseline, ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
-from palpate.surrogates.baselines import OverlapBaseline, depth_series
+from palpate.surrogates.baselines import OverlapBaseline, ToolBaseline, deepest_ball, depth_series
+from palpate.tools import PosedTool
 from palpate.units import Range
 
 __all__ = ["FEWEST", "PressedSolves", "is_pressed", "recognise_pressed"]
@@ -34,7 +36,9 @@ __all__ = ["FEWEST", "PressedSolves", "is_pressed", "recognise_pressed"]
 FEWEST = 6  # solves in contact: what the law and an affine network have to be found from, and judged by
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # what "side" of a box means
 PROBES = ("SphereProbe",)
+TOOL = "SurfaceTool"
 RADIUS = "probe.radius"  # what a family calls it
+PLANE = 1e-9  # by how much the mean normal of a plane surface may fall short of one
 DISSIPATING = ("Plastic",)
 # of the radius: how the touched surface rolls off where it ends, as smooth in the middle as at its border
 SHOULDER = 1 / 3
@@ -52,7 +56,7 @@ def is_pressed(data: Dataset) -> bool:
 
 def _probe(data: Dataset) -> Mapping[str, Any] | None:
     acting = data.provenance.get("problem", {}).get("interactions", [])
-    probes = [a for a in acting if isinstance(a, Mapping) and a.get("type") in PROBES]
+    probes = [a for a in acting if isinstance(a, Mapping) and a.get("type") in (*PROBES, TOOL)]
     return probes[0] if len(probes) == len(acting) == 1 else None
 
 
@@ -114,6 +118,7 @@ class PressedSolves:
     drawn: CarriedSurface | None = (
         None  # the body's own surface, of a file; its triangles are then in four parts
     )
+    tool: str | None = None  # description of a tool as JSON; None of a sphere
 
     @classmethod
     def of(cls, data: Dataset, layout: Layout | None = None) -> PressedSolves:
@@ -136,7 +141,8 @@ class PressedSolves:
         if has_middles(data):
             shown = data["drawn_points"], data["drawn_triangles"]
             drawn = CarriedSurface.bind(*shown, points, own)
-        which, radius = _radius_input(data), float(probe["radius"])
+        which, tool = _radius_input(data), PosedTool.of(probe) if probe["type"] == TOOL else None
+        radius, shift = _ball(probe, tool, rest[triangles[touched]])
         largest = radius if which is None else data.ranges[which].high
         radius = radius if which is None else (data.ranges[which].low + largest) / 2
         matrices, about = declared_symmetry(data)
@@ -148,7 +154,7 @@ class PressedSolves:
             (*widen_ranges(data.ranges[:3], matrices, about), *data.ranges[3:]),
             touched_surface(
                 data,
-                rest,
+                rest - shift,
                 triangles[met],
                 radius=largest,
                 inner=_inner(_deepest(probe), largest),
@@ -163,13 +169,15 @@ class PressedSolves:
             (rest, triangles[met]),
             None if rim is None else (rest[triangles[touched]], rest[triangles[~touched]]),
             drawn,
+            None if tool is None else json.dumps(tool.describe(), sort_keys=True),
         )
 
     @property
     def baseline(self) -> ContactBaseline:
         """The contact baseline to begin with: pad on body, crossing at a tenth of the radius."""
         law = ContactLaw("series", self.radius / 10.0)
-        return ContactBaseline(law, self.surface, self.radius, self.radius_input, self.resolved)
+        parts = law, self.surface, self.radius, self.radius_input, self.resolved
+        return ContactBaseline(*parts) if self.tool is None else ToolBaseline(*parts, self.tool)
 
     def overlap_baselines(self) -> list[Baseline]:
         """Return the baselines by the ball's overlap; none over a flat surface, or where the radius is an input."""
@@ -236,6 +244,25 @@ class PressedSolves:
         return images
 
 
+def _ball(probe: Mapping[str, Any], tool: PosedTool | None, corners: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return the radius in m of the ball whose depth counts, and the way (3,) in m from the place to its centre.
+
+    `corners` (t, 3, 3) are those of the touched triangles in m.
+    """
+    if tool is None:
+        return float(probe["radius"]), np.zeros(3)
+    a, b, c = np.moveaxis(corners, 1, 0)
+    areas = np.cross(b - a, c - a)
+    normal = areas.sum(axis=0) / np.linalg.norm(areas, axis=1).sum()
+    if np.linalg.norm(normal) > 1 - PLANE:
+        return deepest_ball(tool, normal)
+    raise UsageError(
+        f"A {tool.shape} on the curved surface {str(probe['touches'])!r} can't be learnt yet.",
+        why="Which of its points is the deepest changes over the surface.",
+        fix="Learn it on a plane surface, or press the curved one with a SphereProbe.",
+    )
+
+
 def _deepest(probe: Mapping[str, Any]) -> float:
     return float(max(probe.get("depth") or (0.0,)))
 
@@ -256,7 +283,7 @@ def _checked_probe(data: Dataset) -> Mapping[str, Any]:
     if probe is None:
         raise UsageError(
             "This dataset is not of a body under one probe.",
-            why="Its provenance names no single SphereProbe.",
+            why="Its provenance names no single SphereProbe or SurfaceTool.",
             fix="Pass what `palpate.sweep(body, probe, …)` returns; for other arrays use `palpate.fit`.",
         )
     for name in ("potential_energy", "response", "displacement"):

@@ -28,6 +28,7 @@ from .interactions import PointForce as PointForce
 from .interactions import PrescribedDisplacement as PrescribedDisplacement
 from .interactions import Pressure as Pressure
 from .interactions import SphereProbe as SphereProbe
+from .interactions import SurfaceTool as SurfaceTool
 from .interactions import SurfaceTraction as SurfaceTraction
 from .interactions import pad_share as pad_share
 from .interactions import roller as roller

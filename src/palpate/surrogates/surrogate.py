@@ -149,8 +149,7 @@ class Surrogate:
             return self._answers_in_words
         known, baseline = self.energy.going.deepest, self.energy.baseline
         if not baseline.holds:
-            ball = "" if math.isnan(baseline.radius) else f" of radius {millimetres(baseline.radius)}"
-            words = f"pressed by a ball{ball}"
+            words = f"pressed by {baseline.probe_words}"
             words += f", trained to a depth of {millimetres(known)}" if math.isfinite(known) else ""
         else:
             words = f"held and moved along {count(len(baseline.directions), 'direction')}"

@@ -20,6 +20,7 @@ from palpate.learning.bent_body import hand_coordinates
 from palpate.learning.learn_dataset import LearningHistory, filter_record
 from palpate.network import TrainedRegion
 from palpate.surrogates import Field, FieldSurrogate, LearntEnergy, LearntQuantities, NodeField, Surrogate
+from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
 
@@ -215,6 +216,14 @@ def _refuse_radius(energy: LearntEnergy | None, data: Dataset | None) -> None:
         return
     own = energy.baseline.radius
     acting = data.provenance.get("problem", {}).get("interactions", [])
+    tool = getattr(energy.baseline, "posed", None)
+    tools = [PosedTool.of(a) for a in acting if isinstance(a, dict) and a.get("type") == "SurfaceTool"]
+    if any(one != tool for one in tools) or (tool is not None and not tools):
+        raise UsageError(
+            f"The solves were made with {tools[0] if tools else 'another probe'}, the surrogate with "
+            f"{energy.baseline.probe_words}.",
+            fix="Test with solves of the tool that the surrogate was learnt with.",
+        )
     radii = [a["radius"] for a in acting if isinstance(a, dict) and "radius" in a]
     if any(abs(r - own) > RADIUS * own for r in radii):
         raise UsageError(

@@ -24,6 +24,7 @@ from palpate.learning.correction.specimen_posterior import SpecimenPosterior
 from palpate.learning.correction.touches import Touches
 from palpate.options import Discrepancy, Noise
 from palpate.surrogates import ContactBaseline, Surrogate
+from palpate.surrogates.baselines import ToolBaseline
 from palpate.units import bounds
 
 __all__ = ["Corrector", "Event", "Verdict"]
@@ -113,11 +114,13 @@ class Corrector:
         memory: float | None = None,
     ) -> None:
         if not (
-            isinstance(surrogate, Surrogate) and isinstance(surrogate.hand_energy.baseline, ContactBaseline)
+            isinstance(surrogate, Surrogate)
+            and isinstance(surrogate.hand_energy.baseline, ContactBaseline)
+            and not isinstance(surrogate.hand_energy.baseline, ToolBaseline)
         ):
             raise UsageError(
                 f"{surrogate!r:.60} can't be corrected.",
-                why="Measured forces correct a body that a probe presses.",
+                why="Measured forces correct a body that a ball presses.",
                 fix="Pass the body of a study of touches, as `palpate.load` reads it.",
             )
         p = np.array(parameters, dtype=np.float64)

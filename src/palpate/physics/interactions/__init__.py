@@ -2,15 +2,17 @@
 
 interaction         the contract: an interaction, and its terms on an opened body
 sphere              a rigid sphere that presses a surface
+surface_tool        a rigid tool of any shape that presses one
 glued               a pad that is glued to a surface and moved
 prescribed          a surface, or a part of it, that is moved by given amounts; rollers
 loads               a point force, a traction, a body force, a pressure that follows its surface
 
-sphere_contact      a sphere's contact energy, and whether a state is admissible
+pressing            what both have in common: places, approach, contact energy
+tool_contact        a tool's contact energy, and whether a state is admissible
 sphere_design       places and order in which a sphere's positions are solved
 surface_patch       a touched surface as triangles
 bump                the weight under a glued pad or a point force
-rigid_limit         the pad that stands for a rigid sphere
+rigid_limit         the pad that stands for a rigid tool
 pads                the pad's share of what a hand feels
 interaction_checks  directions, ranges, and whether a body can float away
 """
@@ -22,6 +24,7 @@ from palpate.physics.interactions.loads import BodyForce, PointForce, Pressure, 
 from palpate.physics.interactions.pads import PadShare, pad_share
 from palpate.physics.interactions.prescribed import PrescribedDisplacement, roller
 from palpate.physics.interactions.sphere import SphereProbe
+from palpate.physics.interactions.surface_tool import SurfaceTool
 
 __all__ = [
     "Attached",
@@ -37,6 +40,7 @@ __all__ = [
     "PrescribedDisplacement",
     "Pressure",
     "SphereProbe",
+    "SurfaceTool",
     "SurfaceTraction",
     "free_motions",
     "pad_share",

@@ -126,6 +126,13 @@ class Attached:
         going straight from `approach`; by default the Euclidean length.
     first_step : float
         Longest first step along a path, as such a length; later ones adapt.
+    shifts : (n, dof) array, optional
+        For energies of X + u − q alone, as a rigid tool's: unknowns of a constant displacement along each input. The
+        energies change with an input as they do with the unknowns the other way, so all their derivatives by inputs
+        follow from those by unknowns, and none is taken symbolically.
+    turns : callable, optional
+        Gives for inputs (n,) the unknowns (3, dof) by which the body under inspection turns rigidly about x, y and z
+        through the tool's place: the torque on the tool is what its energies change by.
     stiffen : callable, optional
         Gives a very stiff pad a share of its stiffness, 1 after attaching: a path is easier under a softer one.
     """
@@ -139,6 +146,8 @@ class Attached:
     approach: Callable[[np.ndarray], np.ndarray | None] = np.zeros_like
     distance: Callable[[np.ndarray, np.ndarray], float] | None = None
     first_step: float = np.inf
+    shifts: np.ndarray | None = None
+    turns: Callable[[np.ndarray], np.ndarray] | None = None
     stiffen: Callable[[float], None] | None = None
 
 

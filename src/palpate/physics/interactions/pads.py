@@ -24,7 +24,7 @@ import numpy as np
 from palpate.errors import SolverError, UsageError
 from palpate.format import millimetres, number
 from palpate.physics.advice import ModelWarning, advise
-from palpate.physics.interactions.sphere_contact import REACH, pressed_energy
+from palpate.physics.interactions.tool_contact import REACH, pressed_energy
 
 __all__ = ["PadShare", "advise_on_pad", "pad_depth", "pad_share"]
 

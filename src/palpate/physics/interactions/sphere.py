@@ -11,26 +11,15 @@ import numpy as np
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.format import millimetres, number
-from palpate.physics.interactions.interaction import Attached, Energy, Field, PlainInteraction
 from palpate.physics.interactions.interaction_checks import range_of
-from palpate.physics.interactions.sphere_design import (
-    contact_points,
-    depth_series,
-    depths_per_series,
-    group_into_chains,
-    require_fit,
-)
-from palpate.physics.interactions.spread_places import depth_sequence, spread_places
-from palpate.physics.interactions.surface_patch import Patch, surface_of
-from palpate.physics.shapes.meshing import FineMesh
-from palpate.physics.shapes.naming import joint_name, require_known
-from palpate.units import Range
+from palpate.physics.interactions.pressing import Corner, PressingTool, checked_box
+from palpate.physics.interactions.surface_patch import Patch
+from palpate.tools import Sphere
 
 if TYPE_CHECKING:
-    from palpate.physics.interactions.sphere_contact import Contact
     from palpate.physics.shapes.shape import Geometry
 
-__all__ = ["RIGID", "SphereProbe"]
+__all__ = ["RIGID", "SphereProbe", "require_pad"]
 
 ELEMENT = 0.5  # element size under the probe over its radius: the force then ripples by < 0.2 % from 0.1 R of depth on
 ROUND_ELEMENT = 0.4  # the same on curved surfaces, where the elements' shape adds to the error
@@ -43,24 +32,11 @@ RIGID_ELEMENT, RIGID_DEPTH = 0.8, 1 / 6
 RIGID = "rigid"
 """The pad of a rigid sphere, for which a stiffness follows from the body."""
 MARGIN = 1.3  # how far beyond its contact points the probe may touch, over its radius
-# share of the radius: a box of contact points that ends so near to the surface's rim ends there
-END = 1e-3
 INSET = 3.0  # distance of the contact points from the surface's rim over the radius, unless it is given
-MOST_INSET = 0.4  # the same, at most, over the surface's width
-SIDEWAYS = 3.0  # how much dearer a move across is than one along the normal
-FIRST = 0.25  # first step along the approach over the radius
-FIRST_PRESSED = 0.5  # the same, at most, over the pad's stop: staying is then an admissible guess
-# the same, at most, over the largest depth: a large sphere's radius says nothing of the way
-FIRST_DEPTH = 0.25
-OPEN = 0.3  # length of a surface's mean normal from which on it is looked at along one axis
-CLEAR = 1e-9  # share of the radius that rounding may take of a sphere's distance from the surface
-MOST_STEPS = 50  # steps along the normal after which the search for a place outside is given up
-
-Corner = tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class SphereProbe(PlainInteraction):
+class SphereProbe(PressingTool):
     """A rigid sphere with a compliant skin (the pad), whose centre c = (c_x, c_y, c_z) is the input.
 
     The response is the force on the probe, -∂U/∂c in N. The equilibrium meant is the one that is reached along a
@@ -105,12 +81,12 @@ class SphereProbe(PlainInteraction):
     def __post_init__(self) -> None:
         checks.positive("The probe's radius", self.radius, "m")
         if self.pad != RIGID:
-            _require_pad(self.pad)
+            require_pad(self.pad)
         if self.stop is not None:
             checks.positive("The probe's stop", self.stop, "m")
         object.__setattr__(self, "depth", range_of("The depth of a probe", self.depth, "m"))
         if self.over is not None:
-            object.__setattr__(self, "over", _checked_box(self.over))
+            object.__setattr__(self, "over", checked_box(self.over))
 
     def __str__(self) -> str:
         around = "" if self.rim is None else f" and its rim {self.rim!r}"
@@ -126,84 +102,25 @@ class SphereProbe(PlainInteraction):
         return {name: value for name, value in plain.items() if name != "rim" or value is not None}
 
     @property
-    def meets(self) -> str:
-        """The joint name of the surfaces that it may meet: the touched one and its rim."""
-        return joint_name(self.touches, self.rim)
+    def shape(self) -> Sphere:  # type: ignore[override]  # a tool has it as a field
+        """The ball."""
+        return Sphere(self.radius)
 
-    def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
-        """Return the ranges of c_x, c_y and c_z in m: the box around all its positions."""
-        if self.rim is None:
-            patch = self._patch(geometry)
-            require_fit(patch, geometry.rest().points, self.over, max(self.depth), END * self.radius)
-            contacts, normals, _ = self._contact_points(patch, _GRID)
-        else:  # the corners of all triangles that are pressed
-            painted = self._paint(geometry)
-            corners = np.unique(painted.triangles)
-            contacts, normals = painted.points[corners], painted.node_normals[corners]
-        ends = [contacts + normals * (self.radius - d) for d in self.depth]
-        low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)
-        pairs = zip("xyz", low.tolist(), high.tolist(), strict=True)
-        return tuple(Range(f"c_{axis}", a, b, "m") for axis, a, b in pairs)
+    def offset(self, normals: np.ndarray) -> np.ndarray:
+        """Return the radius (N,) in m for each of the outward unit normals (N, 3): so high is the centre at a touch."""
+        return np.full(len(normals), self.radius)
 
-    def refinements(self, geometry: Geometry) -> tuple[FineMesh, ...]:
-        """Return small elements wherever it may touch."""
-        patch = Patch.from_mesh(geometry.rest(), self._surface(geometry))
-        low, high = self._box(patch)
-        low, high = low - MARGIN * self.radius, high + MARGIN * self.radius
-        element = self._element(geometry, patch)
-        return (FineMesh(self.meets, element, tuple(low.tolist()), tuple(high.tolist())),)
+    def contact_radius(self, depth: float) -> float:
+        """Return the radius √(R s) in m of Hertz's contact at a depth s in m, at most the radius."""
+        return math.sqrt(self.radius * min(depth, self.radius))
 
-    def design(self, geometry: Geometry, samples: int, seed: int, depths: int | None = None) -> np.ndarray:
-        """Return positions (samples, 3) in m in depth series, each from shallow to deep.
+    @property
+    def _inset(self) -> float:
+        return INSET * self.radius
 
-        The contact points are a scrambled Sobol sequence (Sobol 1967; Owen 1998) over the touched part of the
-        surface, denser towards sides where the surface ends; the depths of a series are evenly spaced, all shifted by a
-        random share of their distance. `depths` is their number in a series, by default about ¾ √samples.
-
-        With a rim the contact points are far from each other all over the touched surface, so that any first few are
-        spread (see `spread_places`); of one depth each, the depths are a golden sequence.
-        """
-        count = depths_per_series(samples) if depths is None else depths
-        if self.rim is not None:
-            return self._spread_design(geometry, samples, seed, count)
-        from scipy.stats import qmc
-
-        number = -(-samples // count)
-        engine = qmc.Sobol(3, scramble=True, rng=np.random.default_rng(seed))
-        unit, contacts = np.empty((0, 3)), np.empty((0, 3))
-        while len(contacts) < number:  # a surface need not fill its box
-            unit = np.concatenate([unit, engine.random(1 << max(3, int(np.ceil(np.log2(number)))))])
-            contacts, normals, hit = self._contact_points(self._patch(geometry), unit[:, :2])
-        lines = zip(contacts[:number], normals, unit[hit, 2], strict=False)
-        points = [self._series(contact, normal, count, shift) for contact, normal, shift in lines]
-        return np.concatenate(points)[:samples]
-
-    def _spread_design(self, geometry: Geometry, samples: int, seed: int, count: int) -> np.ndarray:
-        """Return positions (samples, 3) in m over places that are far from each other."""
-        number = -(-samples // count)
-        contacts, normals = spread_places(self._paint(geometry), number, seed)
-        width = (self.depth[1] - self.depth[0]) / count
-        first = depth_sequence((self.depth[0], self.depth[0] + width), number, seed)
-        depths = first[:, None] + width * np.arange(count)
-        points = contacts[:, None] + (self.radius - depths)[:, :, None] * normals[:, None]
-        return np.asarray(points.reshape(-1, 3)[:samples])
-
-    def random_presses(self, geometry: Geometry, samples: int, seed: int) -> np.ndarray:
-        """Return positions (samples, 3) in m, independent of each other, even over the touched area and all depths.
-
-        They judge a surrogate by what was to be touched, margin and rim of its design aside.
-        """
-        rng = np.random.default_rng(seed)
-        touched = surface_of(geometry, self.touches, self.refinements(geometry))
-        contacts, normals = touched.spread_with_normals(rng.random((samples, 2)))
-        depths = rng.uniform(*self.depth, samples)
-        return np.asarray(contacts + (self.radius - depths)[:, None] * normals)
-
-    def chains(self, geometry: Geometry, points: np.ndarray) -> list[np.ndarray]:
-        """Return rows of positions (N, 3) in chains: depth series, else neighbours, from shallow to deep."""
-        centres = np.asarray(points, dtype=float)
-        contacts, distance = contact_points(self._patch(geometry), centres)
-        return group_into_chains(centres, contacts, distance, self.radius)
+    @property
+    def _margin(self) -> float:
+        return MARGIN * self.radius
 
     def with_radius(self, geometry: Geometry, radius: float) -> SphereProbe:
         """Return a probe of another radius in m that visits the same contact points to the same depths."""
@@ -216,47 +133,6 @@ class SphereProbe(PlainInteraction):
         normals = np.array([patch.nearest(centre)[1] for centre in centres])
         return np.asarray(centres + (radius - self.radius) * normals)
 
-    def attach(self, field: Field) -> Attached:
-        """Return its contact energy on an opened body.
-
-        Raises
-        ------
-        UsageError
-            For a rigid sphere that no problem has given a pad.
-        """
-        if isinstance(self.pad, str):
-            raise UsageError(
-                "A rigid sphere can't be attached by itself.",
-                why="The stiffness of its pad follows from the body.",
-                fix="Put a body under it: body.problem(probe).",
-            )
-        return self.attach_pad(field, self.pad)
-
-    def attach_pad(self, field: Field, pad: Any) -> Attached:
-        """Return its contact energy on an opened body with a stiffness, a number in N/m³ or a parameter of NGSolve."""
-        import ngsolve
-
-        from palpate.physics.interactions.sphere_contact import Contact, pad_energy
-
-        contact = Contact(field, field.rest, self.meets, self.radius, self.stop)
-        centre = tuple(ngsolve.Parameter(0.0) for _ in range(3))
-        penetration = contact.penetration(field.trial, ngsolve.CF(centre))
-        energy = Energy(pad_energy(penetration, pad, self.stop), contact.measure())
-        approach = _Approach(self, field, contact)
-        return Attached(
-            centre,
-            (energy,),
-            inspect=contact.inspect,
-            approach=approach,
-            distance=approach.distance,
-            first_step=self._first_step(),
-        )
-
-    def _first_step(self) -> float:
-        """Return the longest first step along the approach in m."""
-        pressed = np.inf if self.stop is None else FIRST_PRESSED * self.stop
-        return float(min(FIRST * self.radius, pressed, FIRST_DEPTH * max(map(abs, self.depth))))
-
     def _element(self, geometry: Geometry, patch: Patch) -> float:
         """Return the element size in m under the sphere."""
         if len(geometry.regions) > 1:
@@ -267,107 +143,9 @@ class SphereProbe(PlainInteraction):
         contact = math.sqrt(self.radius * depth)
         return float(f"{min(ROUND_ELEMENT * self.radius, RIGID_ELEMENT * contact):.2g}")
 
-    def _surface(self, geometry: Geometry) -> str:
-        for name in (self.touches, *([] if self.rim is None else [self.rim])):
-            require_known("surface", name, geometry.surfaces)
-        return self.touches
 
-    def _patch(self, geometry: Geometry) -> Patch:
-        """Return the surface that it may meet."""
-        return surface_of(geometry, self.meets, self.refinements(geometry))
-
-    def _paint(self, geometry: Geometry) -> Patch:
-        """Return the surface that is pressed, with a rim: the touched one, or its part in a given box."""
-        painted = surface_of(geometry, self.touches, self.refinements(geometry))
-        return painted if self.over is None else _within(painted, *self._box(painted))
-
-    def _box(self, patch: Patch) -> tuple[np.ndarray, np.ndarray]:
-        """Return the lower and upper corner (3,) in m of the box of contact points."""
-        low, high = (corner.copy() for corner in patch.box)
-        if self.over is not None:
-            for axis, (a, b) in enumerate(zip(*self.over, strict=True)):
-                low[axis], high[axis] = a, b
-        if self.over is not None or self.rim is not None:
-            return low, high
-        # along the surface only: a closed one faces nowhere in the mean and has no rim
-        along = (np.abs(patch.facing) < 0.5 * np.linalg.norm(patch.facing)) & _is_open(patch)
-        inset = np.minimum(INSET * self.radius, MOST_INSET * (high - low)) * along
-        return low + inset, high - inset
-
-    def _contact_points(self, patch: Patch, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return contact points (M, 3) in m, outward normals (M, 3), and a mask of the places (N, 2) that have one."""
-        low, high = self._box(patch)
-        axis = int(np.argmax(np.abs(patch.facing)))
-        if _is_open(patch):
-            across = [i for i in range(3) if i != axis]
-            ends = [
-                np.abs(a - b)[across] < END * self.radius for a, b in zip((low, high), patch.box, strict=True)
-            ]
-            unit = _denser(unit, *ends)
-            places = low[across] + unit * (high - low)[across]
-            contacts = patch.cast(axis, float(np.sign(patch.facing[axis])), places)
-        else:
-            contacts = _within(patch, low, high).spread(unit)
-        hit = np.isfinite(contacts).all(axis=1)
-        contacts = contacts[hit]
-        if not len(contacts):
-            raise UsageError(
-                f"The probe's contact points miss the surface {self.touches!r}.",
-                why=f"They are to be in {low} … {high} m, the surface {patch.box[0]} … {patch.box[1]} m.",
-                fix="Give `over` within the surface, in m.",
-            )
-        return contacts, np.array([patch.nearest(contact)[1] for contact in contacts]), hit
-
-    def _series(self, contact: np.ndarray, normal: np.ndarray, count: int, shift: float) -> np.ndarray:
-        """Return centres (count, 3) in m above one contact point."""
-        depths = depth_series(self.depth, count, shift)
-        return np.asarray(contact + normal * (self.radius - depths)[:, None])
-
-
-class _Approach:
-    """The straight line along which a sphere comes to a position from outside."""
-
-    def __init__(self, probe: SphereProbe, field: Field, contact: Contact) -> None:
-        self._probe, self._field, self._contact = probe, field, contact
-        self._known: Patch | None = None
-
-    @property
-    def _patch(self) -> Patch:
-        """The touched surface under the constant loads alone."""
-        if self._known is None:
-            displacement = self._field.at_nodes(self._field.base)
-            self._known = Patch.from_mesh(self._field.rest, self._probe.meets, displacement)
-        return self._known
-
-    def __call__(self, centre: np.ndarray) -> np.ndarray | None:
-        """Return the first position (3,) from `centre` along the outward normal that is clear of the surface.
-
-        None where there is none, or a fixed surface is in the way from there.
-        """
-        radius, patch = self._probe.radius, self._patch
-        _, normal, distance = patch.nearest(centre)
-        place = np.array(centre, dtype=float)
-        for _ in range(MOST_STEPS):
-            # the triangles are straight, the surface that the contact's energy sees may bulge out of them
-            overlap = max(radius * (1 - CLEAR) - distance, self._contact.overlap(place))
-            if overlap <= 0:
-                return None if self._contact.meets_fixed_part(place, centre) else place
-            place = place + (overlap + CLEAR * radius) * normal
-            distance = patch.nearest(place)[2]
-        return None
-
-    def distance(self, here: np.ndarray, there: np.ndarray) -> float:
-        """Return the length in m of a way between two positions, its part along the surface counted several times."""
-        normal = self._patch.nearest(there)[1]
-        step = there - here
-        along = float(step @ normal)
-        return float(np.hypot(along, SIDEWAYS * np.linalg.norm(step - along * normal)))
-
-
-_GRID = np.stack(np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9)), axis=-1).reshape(-1, 2)
-
-
-def _require_pad(pad: Any) -> None:
+def require_pad(pad: Any) -> None:
+    """Refuse a pad that is no positive stiffness in N/m³."""
     if isinstance(pad, str):
         raise UsageError(
             f"The pad of a probe is {pad!r}.",
@@ -375,44 +153,3 @@ def _require_pad(pad: Any) -> None:
             fix='Give a number such as 2e6, or "rigid".',
         )
     checks.positive("The probe's pad stiffness", pad, "N/m³")
-
-
-def _denser(unit: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return places (N, 2) of the unit square, closer together at those sides (2,) that are ends of the body.
-
-    There the body gives way within a few mm, and nothing is known beyond: the density is that of Chebyshev's points.
-    """
-    both, first, last = (1 - np.cos(np.pi * unit)) / 2, 1 - np.cos(np.pi / 2 * unit), np.sin(np.pi / 2 * unit)
-    return np.where(low & high, both, np.where(low, first, np.where(high, last, unit)))
-
-
-def _is_open(patch: Patch) -> bool:
-    """Return whether a surface faces one way in the mean: a dome does, and a hemisphere's mean normal is ½ long."""
-    return bool(np.linalg.norm(patch.facing) > OPEN)
-
-
-def _within(patch: Patch, low: np.ndarray, high: np.ndarray) -> Patch:
-    """Return the triangles whose middle is in a box."""
-    middle = patch.corners.mean(axis=1)
-    inside = ((middle >= low) & (middle <= high)).all(axis=1)
-    return Patch(patch.points, patch.triangles[inside] if inside.any() else patch.triangles)
-
-
-def _checked_box(value: Any) -> tuple[Corner, Corner]:
-    try:
-        corners = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        corners = np.empty(0)
-    if (
-        corners.ndim != 2
-        or corners.shape[0] != 2
-        or corners.shape[1] not in {2, 3}
-        or (corners[0] > corners[1]).any()
-    ):
-        raise UsageError(
-            f"The box of the probe's contact points is {value}.",
-            why="It needs a lower and an upper corner, each of two or three coordinates in m.",
-            fix="For example over=((0.03, 0.03), (0.07, 0.07)).",
-        )
-    lower, upper = corners.tolist()
-    return tuple(lower), tuple(upper)

@@ -84,6 +84,8 @@ class SolidSolution:
         The sphere among the interactions, if there is one.
     centre : (3,) array or None
         Where its centre is, in m.
+    torque : (3,) array or None
+        Torque on a `SurfaceTool` about its place, in N m; None without such a tool, and unless converged.
     mid_sides : MidSides or None
         Displacements in the middle of the mesh's edges, with which pictures are drawn; None unless converged.
     """
@@ -114,6 +116,7 @@ class SolidSolution:
     fixed: tuple[str, ...] = ()
     probe: SphereProbe | None = None
     centre: np.ndarray | None = None
+    torque: np.ndarray | None = None
     mid_sides: MidSides | None = None
 
     @property
@@ -176,6 +179,9 @@ class SolidSolution:
         if self.converged:
             lines += [
                 f"  response     {self._responses()}",
+                ""
+                if self.torque is None
+                else f"  torque       {', '.join(number(t) for t in self.torque)} N m",
                 f"  energy       {self.potential_energy:.6g} J, {self.strain_energy:.6g} J of it in the body",
                 f"  penetration  {1e3 * self.penetration:.3g} mm into the pad" if self.probe else "",
                 f"  strain       largest |λ − 1| {self.largest_strain:.3g}, "

@@ -212,6 +212,7 @@ class _SolutionBuilder:
         hessian, slope = model.inputs.hessian(model.system, z)
         model.field.show(z)
         measured = model.measures.at_nodes() if fields else {}
+        torque = model.inputs.torque(z, q)
         # only now: the step's own tangent and stress are those with the internal variables before it
         strain_energy, energy = model.conclude(z)
         solution = self._solution(
@@ -223,6 +224,7 @@ class _SolutionBuilder:
             log=path.log,
             response=response,
             response_gradient=-hessian,
+            torque=torque,
             potential_energy=energy,
             strain_energy=strain_energy,
             **self._shown(PathPoint(q, z), path.verdict.figures),

@@ -10,7 +10,11 @@ z = z_free + z_base + Σ qᵢ Lᵢ on given unknowns, by the envelope theorem
     Dᵢⱼ = ∂²Π/∂qᵢ∂qⱼ + Lᵢ · ∂²Π/∂z∂qⱼ + Lⱼ · ∂²Π/∂z∂qᵢ + Lᵢ · K Lⱼ,
 
 and the states follow the inputs with ∂z/∂qᵢ = Lᵢ - K⁻¹ Bᵢ. The derivatives of densities in their parameters are
-taken symbolically.
+taken symbolically. A rigid tool's energy Π_t is one of X + u − q alone, so with the unknowns eᵢ of a displacement by 1
+
+    ∂Π_t/∂qᵢ = -eᵢ · ∂Π_t/∂z,    ∂²Π_t/∂z∂qᵢ = -K_t eᵢ,    ∂²Π_t/∂qᵢ∂qⱼ = eᵢ · K_t eⱼ,
+
+and its torque follows in the same way from the unknowns of a rigid turn.
 """
 
 from __future__ import annotations
@@ -171,6 +175,7 @@ class Inputs:
         self.constrained = np.zeros(field.size, dtype=bool)
         self._first: list[list[Any]] = [[] for _ in range(self.size)]
         self._second: dict[tuple[int, int], list[Any]] = {}
+        self._shifted: list[tuple[slice, Attached, Any]] = []
         for part, rows in zip(attached, self.slices, strict=True):
             self._add(part, rows)
 
@@ -183,7 +188,19 @@ class Inputs:
         """Return ∂U/∂q (n,) at an equilibrium z (dof,) with ∂Π/∂z (dof,)."""
         state = self._at(z)
         explicit = [sum(form.Energy(state) for form in forms) for forms in self._first]
+        for rows, part, form in self._shifted:
+            explicit[rows] = (-part.shifts @ self._slope(form, state)).tolist()  # type: ignore[operator]  # they have shifts
         return np.asarray(explicit - self.loads @ z + self.lifts @ reactions)
+
+    def torque(self, z: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+        """Return the torque (3,) in N m on the first rigid tool about its place; None where there is none.
+
+        The state z (dof,) under inputs q (n,) must be the one under inspection.
+        """
+        for rows, part, form in self._shifted:
+            if part.turns is not None:
+                return np.asarray(part.turns(q[rows]) @ self._slope(form, self._at(z)))
+        return None
 
     def sensitivity(self, system: System, z: np.ndarray) -> np.ndarray:
         """Return ∂z/∂q (n, dof) with the system's present tangent."""
@@ -201,7 +218,7 @@ class Inputs:
         coupling = explicit + lifted
         inner = self._solve_rows(system, coupling)
         mixed = self.lifts @ explicit.T
-        own = self._input_hessian(z) + mixed + mixed.T + self.lifts @ lifted.T
+        own = self._input_hessian(z, explicit) + mixed + mixed.T + self.lifts @ lifted.T
         return own - coupling @ inner.T, self.lifts - inner
 
     def _add(self, part: Attached, rows: slice) -> None:
@@ -212,20 +229,31 @@ class Inputs:
             self.lifts[rows] = part.lifts
         if part.constrained is not None:
             self.constrained |= part.constrained
+        if part.shifts is not None:
+            self._shifted.append((rows, part, self._form([(e.density, e.measure) for e in part.energies])))
+            return
         for term in part.energies:
             for i, first in enumerate(part.parameters):
                 slope = term.density.Diff(first)
-                self._first[rows.start + i].append(self._form(slope, term.measure))
+                self._first[rows.start + i].append(self._form([(slope, term.measure)]))
                 for j, second in enumerate(part.parameters[: i + 1]):
                     key = (rows.start + i, rows.start + j)
-                    self._second.setdefault(key, []).append(self._form(slope.Diff(second), term.measure))
+                    self._second.setdefault(key, []).append(self._form([(slope.Diff(second), term.measure)]))
 
-    def _form(self, density: Any, measure: Any) -> Any:
+    def _form(self, terms: Sequence[tuple[Any, Any]]) -> Any:
+        """Return the sum of densities, each with its measure."""
         import ngsolve
 
         form = ngsolve.BilinearForm(self._field.space, symmetric=True)
-        form += ngsolve.Variation(density.Compile() * measure)
+        for density, measure in terms:
+            form += ngsolve.Variation(density.Compile() * measure)
         return form
+
+    def _slope(self, form: Any, state: Any) -> np.ndarray:
+        """Return the derivative (dof,) of a form by the unknowns."""
+        result = self._field.state.vec.CreateVector()
+        form.Apply(state, result)
+        return np.array(result.FV().NumPy())
 
     def _coupling(self, z: np.ndarray) -> np.ndarray:
         """Return ∂²Π/∂z∂q without the lifts, shape (n, dof)."""
@@ -235,13 +263,21 @@ class Inputs:
             for form in forms:
                 form.Apply(state, result)
                 row += result.FV().NumPy()
+        for rows, part, form in self._shifted:
+            form.AssembleLinearization(state)
+            for row, shift in zip(coupling[rows], part.shifts, strict=True):  # type: ignore[arg-type]  # they have shifts
+                other = self._at(shift)
+                result.data = form.mat * other
+                row -= result.FV().NumPy()
         return coupling
 
-    def _input_hessian(self, z: np.ndarray) -> np.ndarray:
-        """Return ∂²Π/∂q∂q, shape (n, n)."""
+    def _input_hessian(self, z: np.ndarray, coupling: np.ndarray) -> np.ndarray:
+        """Return ∂²Π/∂q∂q (n, n); `coupling` (n, dof) is ∂²Π/∂z∂q without the lifts."""
         state, own = self._at(z), np.zeros((self.size, self.size))
         for (i, j), forms in self._second.items():
             own[i, j] = own[j, i] = sum(form.Energy(state) for form in forms)
+        for rows, part, _ in self._shifted:
+            own[rows, rows] = -coupling[rows] @ part.shifts.T  # type: ignore[union-attr]  # they have shifts
         return own
 
     def _lift_forces(self, system: System) -> np.ndarray:

@@ -3,6 +3,7 @@
 baseline            the contract, and the registry by name
 contact_baseline    a sphere that presses a surface, by the closest point
 overlap_baseline  the same, by all of the surface that it meets
+tool_baseline       a rigid tool that presses a plane surface, by its deepest point
 pad_baseline        a patch or node that is held and displaced
 constant_baseline   a constant, for several loads whose place of rest moves
 """
@@ -20,6 +21,7 @@ from palpate.surrogates.baselines.overlap_baseline import OverlapBaseline
 from palpate.surrogates.baselines.pad_baseline import PadBaseline
 from palpate.surrogates.baselines.rest_stiffness import RestStiffness
 from palpate.surrogates.baselines.stiffening import Stiffening
+from palpate.surrogates.baselines.tool_baseline import ToolBaseline, deepest_ball
 
 __all__ = [
     "Baseline",
@@ -30,7 +32,9 @@ __all__ = [
     "RestStiffness",
     "Solves",
     "Stiffening",
+    "ToolBaseline",
     "baseline_class",
+    "deepest_ball",
     "depth_series",
     "register_baseline",
     "registered_baselines",

@@ -25,6 +25,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.format import millimetres
 from palpate.network.kinds import register_kind
 from palpate.surrogates.baselines.graph_form import BaselineForm, Graph, Touch, Value
 from palpate.surrogates.energy_kernels import GRADIENT, HESSIAN, SMALL, VECTORS, Compiled
@@ -134,6 +135,11 @@ class Baseline(ABC):
     def radius_input(self) -> int | None:
         """The input that is the probe's radius; None where none is."""
         return None
+
+    @property
+    def probe_words(self) -> str:
+        """The probe in a few words, as "pressed by …" has it."""
+        return "a ball" if math.isnan(self.radius) else f"a ball of radius {millimetres(self.radius)}"
 
     @property
     def amplitude(self) -> Amplitude:

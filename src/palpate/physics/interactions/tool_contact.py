@@ -1,6 +1,10 @@
-"""Frictionless contact of a rigid sphere with a surface, as an energy of a pad with a stop.
+"""Frictionless contact of a rigid tool with a surface, as an energy of a pad with a stop.
 
-On the penetration p = R - |X + u - c| the pad between sphere and surface stores per undeformed area
+A tool of signed distance d in its own frame, turned by R, with its centre at c, penetrates the surface by
+
+    p = -d(Rᵀ(X + u - c)),
+
+for a sphere its radius less |X + u - c|. The pad between tool and surface stores per undeformed area
 
     φ(p) = ½ k p² / (1 - p/p_m)   for 0 < p < p_m,   else 0 (p ≤ 0) or not admissible.
 
@@ -22,14 +26,14 @@ from palpate.physics.interactions.surface_patch import Patch
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.surface_checks import winding_number
 from palpate.physics.stop import Stop, Verdict
+from palpate.tools import Tool
 
 __all__ = ["REACH", "Contact", "pad_energy", "pressed_energy"]
 
 REACH = 0.98  # share of the stop up to which states are admissible
 BONUS = 6  # orders of quadrature beyond the elements' own: contact has an edge within elements
-WAY = 0.05  # distance of the places at which a sphere's way is looked at, over the radius
-TINY = 1e-9  # m; keeps the distance to the sphere's centre differentiable
-# cosine from a surface's normal to the sphere's centre, below which the surface faces away: a fold of it takes less
+WAY = 0.05  # distance of the places at which a tool's way is looked at, over its inscribed radius
+# cosine from a surface's normal to the way into the tool, below which the surface faces away: a fold of it takes less
 FACING_AWAY = -0.1
 
 
@@ -57,13 +61,17 @@ def pad_energy(penetration: Any, pad: float, stop: float | None) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A sphere and the quadrature points of the surface that it may touch."""
+    """A tool and the quadrature points of the surface that it may touch; its inputs are its place."""
 
     field: Field
     mesh: BodyMesh  # the body at rest, its nodes those of the field's mesh
     surface: str
-    radius: float  # R, m
+    shape: Tool
     stop: float | None  # p_m, m; None for a pad without a stop
+    turn: np.ndarray | None = None  # R (3, 3); None for none
+    to_centre: np.ndarray | None = (
+        None  # way (3,) from the place to the shape's centre, m; None where they are one
+    )
 
     def measure(self) -> Any:
         """Return the surface's differential symbol."""
@@ -71,53 +79,66 @@ class Contact:
 
         return ngsolve.ds(definedon=self.field.surface(self.surface), bonus_intorder=BONUS)
 
-    def penetration(self, displacement: Any, centre: Any) -> Any:
-        """Return p = R - |X + u - c| as a coefficient function, positive in contact."""
+    def penetration(self, displacement: Any, place: Any) -> Any:
+        """Return p = -d(Rᵀ(X + u - c)) as a coefficient function, positive in contact."""
         import ngsolve as ngs
 
-        to_surface = ngs.CF((ngs.x, ngs.y, ngs.z)) + displacement - centre
-        return self.radius - ngs.sqrt(ngs.InnerProduct(to_surface, to_surface) + TINY**2)
+        to_surface = ngs.CF((ngs.x, ngs.y, ngs.z)) + displacement - place
+        if self.to_centre is not None:
+            to_surface = to_surface - ngs.CF(tuple(self.to_centre.tolist()))
+        if self.turn is not None:
+            to_surface = ngs.CF(tuple(self.turn.T.ravel().tolist()), dims=(3, 3)) * to_surface
+        return -self.shape.distance(to_surface)
 
-    def inspect(self, centre: np.ndarray) -> Verdict:
-        """Return a verdict on the state in `field.displacement` under a sphere at (3,) m.
+    def _in_frame(self, points: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Return points (N, 3) in m in the tool's own frame."""
+        away = points - self._centre(place)
+        return away if self.turn is None else away @ self.turn
 
-        The surface must not be pressed past the pad's stop; where it is pressed it must face the centre, so that
-        the pad pushes and never pulls; and the centre must be outside the deformed body.
+    def _centre(self, place: np.ndarray) -> np.ndarray:
+        return place if self.to_centre is None else place + self.to_centre
+
+    def inspect(self, place: np.ndarray) -> Verdict:
+        """Return a verdict on the state in `field.displacement` under a tool at (3,) m.
+
+        The surface must not be pressed past the pad's stop; where it is pressed it must face into the tool, so that
+        the pad pushes and never pulls; and the tool's centre must be outside the deformed body.
         """
         places, normals = self._deformed_surface()
-        towards = centre - places
-        distance = np.linalg.norm(towards, axis=1)
-        penetration = self.radius - distance
+        own = self._in_frame(places, place)
+        penetration = -self.shape.distance(own)
         figures = {"penetration": max(0.0, float(penetration.max()))}
         if self.stop is not None and figures["penetration"] > REACH * self.stop:
             detail = f"{1e3 * figures['penetration']:.3g} mm of {1e3 * self.stop:.3g} mm"
             return Verdict(Stop.PAST_STOP, detail, figures)
         pressed = penetration > 0
-        cosines = np.einsum("ni,ni->n", towards[pressed], normals[pressed]) / distance[pressed]
+        inwards = -self.shape.gradient(own[pressed])
+        inwards = inwards if self.turn is None else inwards @ self.turn.T
+        cosines = np.einsum("ni,ni->n", inwards, normals[pressed])
         if cosines.size and cosines.min() < FACING_AWAY:
             return Verdict(Stop.THROUGH_SURFACE, "a pressed part of the surface faces away from it", figures)
-        if self._inside(centre):
+        if self._inside(self._centre(place)):
             return Verdict(Stop.THROUGH_SURFACE, "the deformed body encloses it", figures)
         return Verdict(figures=figures)
 
-    def overlap(self, centre: np.ndarray) -> float:
-        """Return the depth in m of a sphere at (3,) m in the surface in its base state; negative outside."""
-        return float(self.radius - np.linalg.norm(self._places - centre, axis=1).min())
+    def overlap(self, place: np.ndarray) -> float:
+        """Return the depth in m of a tool at (3,) m in the surface in its base state; negative outside."""
+        return float(-self.shape.distance(self._in_frame(self._places, place)).min())
 
-    def meets_fixed_part(self, outside: np.ndarray, centre: np.ndarray) -> bool:
-        """Return whether a sphere on its way from `outside` (3,) to `centre` (3,) in m must overlap a fixed surface.
+    def meets_fixed_part(self, outside: np.ndarray, place: np.ndarray) -> bool:
+        """Return whether a tool on its way from `outside` (3,) to `place` (3,) in m must overlap a fixed surface.
 
-        A fixed surface stays where it is, so the body reaches up to it. A sphere on the body's side of it that is
-        nearer than its radius less what the pad yields would have the body pressed past the stop.
+        A fixed surface stays where it is, so the body reaches up to it. A centre on the body's side of it that is
+        nearer than the tool's inscribed radius less what the pad yields would have the body pressed past the stop.
         """
         if self.stop is None or self._fixed_part is None:
             return False
-        reach = self.radius - self.stop
-        count = max(2, int(np.ceil(np.linalg.norm(centre - outside) / (WAY * self.radius))) + 1)
-        way = outside + np.linspace(0, 1, count)[:, None] * (centre - outside)
+        reach = self.shape.inscribed - self.stop
+        count = max(2, int(np.ceil(np.linalg.norm(place - outside) / (WAY * self.shape.inscribed))) + 1)
+        way = self._centre(outside) + np.linspace(0, 1, count)[:, None] * (place - outside)
         low, high = self._fixed_part.box
         near = (way > low - reach).all(axis=1) & (way < high + reach).all(axis=1)
-        return any(-reach < self._fixed_part.nearest(place)[2] < 0 for place in way[near])
+        return any(-reach < self._fixed_part.nearest(middle)[2] < 0 for middle in way[near])
 
     @cached_property
     def _fixed_part(self) -> Patch | None:

@@ -1,0 +1,102 @@
+"""A body under a tool: a ball as a tool answers at its foremost point; what can't be learnt or shown is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import palpate as pp
+import pressed
+from palpate.dataset import Dataset
+from palpate.errors import UsageError
+from palpate.export import export_c
+from palpate.learning.pressed_solves import PressedSolves
+from palpate.runtime.touchable import touchable
+from palpate.surrogates.baselines import deepest_ball
+from palpate.tools import Capsule, PosedTool, Punch, Sphere
+from palpate.validation import TouchSolves
+from palpate.viewer.page_model import PageModel
+from pressed import DEEPEST, RADIUS
+
+# from the place to the ball's centre, and to where the dataset's mesh has its plane
+WAY = np.array([-0.1, -0.1, RADIUS])
+
+
+def under(tool: PosedTool, touches: str = "top", count: int = 60) -> Dataset:
+    """Solves of the closed form, told of as those under a tool a radius before the ball's centre."""
+    acting = {"type": "SurfaceTool", "touches": touches, "depth": (0.0, DEEPEST), **tool.describe()}
+    inputs = tuple(
+        pp.Range(f"p{r.name[1:]}", r.low - w, r.high - w, "m")
+        for r, w in zip(pressed.INPUTS, WAY.tolist(), strict=True)
+    )
+    X = pressed.places(count)
+    test = TouchSolves(X - WAY, pressed.force(X), pressed.energy(X), pressed.stiffness(X))
+    return pressed.dataset(test, acting=acting, inputs=inputs)
+
+
+@pytest.fixture(scope="module")
+def ball() -> pp.Surrogate:
+    """The closed form, learnt as that of a ball whose place is its foremost point."""
+    return pp.learn(under(PosedTool(Sphere(RADIUS))), effort=0.1, shape=False)[0]
+
+
+@pytest.mark.full
+def test_a_ball_as_a_tool_answers_as_the_closed_form(ball):
+    unseen = pressed.places(100, seed=9)
+    wanted = pressed.force(unseen)
+    error = np.linalg.norm(ball.energy.force(unseen - WAY) - wanted, axis=1) / np.linalg.norm(wanted, axis=1)
+    assert np.median(error) < 0.01
+    above = unseen + np.array([0.0, 0.0, DEEPEST])
+    assert (ball.energy.force(above - WAY) == 0.0).all()
+
+
+@pytest.mark.full
+def test_its_file_answers_the_same_and_names_the_tool(ball, tmp_path):
+    again = pp.load(ball.save(tmp_path / "ball.palpate"))
+    X = pressed.places(20) - WAY
+    np.testing.assert_array_equal(again.energy.force(X), ball.energy.force(X))
+    assert again.energy.baseline.posed == PosedTool(Sphere(RADIUS))
+    assert "sphere of radius 10 mm" in str(again)
+
+
+@pytest.mark.full
+def test_a_hand_feels_it_at_the_foremost_point(ball):
+    body = touchable(ball)
+    assert abs(body.home[2]) < 2e-6  # the plane z = 0, as true as its distance
+    hand, place = body.evaluator(), np.array([0.102, 0.101, -0.003])
+    hand.place(place, holding=True, believed=True)
+    hand(place, np.zeros(0))
+    np.testing.assert_allclose(hand.force, ball.energy.force(place[None])[0], rtol=1e-9)
+
+
+@pytest.mark.full
+def test_what_does_not_know_tools_refuses_them(ball, tmp_path):
+    with pytest.raises(UsageError, match="no page draws"):
+        PageModel(touchable(ball))
+    with pytest.raises(UsageError, match="can't be exported yet"):
+        export_c(ball, tmp_path)
+    with pytest.raises(UsageError, match="tool"):
+        pp.validate(ball, pressed.dataset(pressed.solves()))
+
+
+def test_the_deepest_point_of_a_tilted_tool():
+    """The ball around it touches a plane when the tool does: it is nowhere outside on the side of the plane."""
+    normal = np.array([0.0, 0.0, 1.0])
+    rng = np.random.default_rng(0)
+    for tool in (
+        PosedTool(Capsule(0.006, 0.03), (0.1, 0.2, 0.3)),
+        PosedTool(Punch(0.006, 0.001), (0.2, 0.0, 0.0)),
+    ):
+        radius, way = deepest_ball(tool, normal)
+        points = rng.uniform(-0.05, 0.05, (20000, 3)) @ np.diag([1.0, 1.0, 0.2])
+        for _ in range(60):
+            points = points - tool.shape.distance(points)[:, None] * tool.shape.gradient(points)
+        lowest = (points @ tool.turn.T + tool.to_centre)[:, 2].min()
+        assert way[2] - radius == pytest.approx(lowest, abs=2e-5)
+        assert radius >= tool.shape.size
+
+
+def test_a_tool_on_a_curved_surface_is_refused():
+    """The three sides of the tetrahedron face different ways: the deepest point depends on the place."""
+    with pytest.raises(UsageError, match="curved surface 'side' can't be learnt"):
+        PressedSolves.of(under(PosedTool(Capsule(0.006, 0.03)), touches="side"))

@@ -21,7 +21,6 @@ from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import NodeField
-from palpate.surrogates.baselines import ToolBaseline
 from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.units import Range, bounds
 from palpate.viewer.about_record import about_record
@@ -237,7 +236,7 @@ def _ranges(inputs: tuple[Range, ...]) -> tuple[RangeInfo, ...]:
 def _require_ball(body: Touchable) -> None:
     """Refuse a body under another tool than a ball: the page would draw a ball at the tool's foremost point."""
     baseline = body.energy.baseline
-    if isinstance(baseline, ToolBaseline):
+    if getattr(baseline, "posed", None) is not None:
         raise UsageError(
             f"{body.name} is pressed by {baseline.probe_words}, which no page draws yet.",
             why="A page draws a ball around the hand's place, and that is the tool's foremost point.",

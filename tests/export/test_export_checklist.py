@@ -21,13 +21,15 @@ from models import linear_network
 from palpate.errors import AccuracyError, UsageError
 from palpate.export import export_c, export_fmu, export_lib
 from palpate.export.c_export import block_of, compare_c
+from palpate.export.check_engine import CheckEngine, engine_library
 from palpate.export.check_points import Comparison, Precision, compare_body, places, true_answers
 from palpate.export.check_program import CheckProgram
 from palpate.export.compilers import STRICT
 from palpate.export.onnx_export import export_onnx
 from palpate.export.wasm_core import WasmCore
-from palpate.surrogates import LearntEnergy
+from palpate.surrogates import ContactBaseline, ContactLaw, Continuation, LearntEnergy, TouchedSurface
 from palpate.surrogates.memories import Memory, MemoryState
+from pressed import CORNERS, DEEPEST, INPUTS, RADIUS
 from system_programs import require_program
 
 # what optimisation would remove is looked at too; other exporters here are optimised
@@ -55,6 +57,17 @@ def library(thing: pp.Surrogate, folder: Path) -> Comparison:
     return done.comparison
 
 
+def engine(thing: pp.Surrogate, folder: Path) -> Comparison:
+    """Export to the generic library for engines, which a package of Unity brings."""
+    del folder
+    library, name = engine_library(), next(iter(thing.fields), None)
+    if library is None:
+        pytest.skip("there is no library for this system and processor")
+    block = block_of(thing, field=name, with_field=name is not None, deviation=False)
+    with CheckEngine(library, block.to_bytes()) as asked:
+        return compare_body(thing, asked, field=block.field, deviation=False)
+
+
 def page(thing: pp.Surrogate, folder: Path) -> Comparison:
     """Export to WebAssembly, as a page that is one file has it."""
     del folder
@@ -80,11 +93,18 @@ EXPORTERS = {
     "clang": c_with("clang", *STRICT),
     "tcc": c_with("tcc", "-Wall", "-Werror"),
     "lib": library,
+    "engine": engine,
     "float": c_with("gcc", *STRICT, *SANITIZED, single=True),
 }
-ON_ALL = ("gcc", "float", "page", "onnx")  # the others on two bodies: the sources are the same
+ON_ALL = ("gcc", "float", "page", "onnx", "engine")  # the others on two bodies: the sources are the same
 ON_SOME = ("relaxation", "pad")
-PLAIN = {("gcc", "relaxation"), ("lib", "pad"), ("page", "relaxation"), ("onnx", "pad")}
+PLAIN = {
+    ("gcc", "relaxation"),
+    ("lib", "pad"),
+    ("page", "relaxation"),
+    ("onnx", "pad"),
+    ("engine", "indentation"),
+}
 
 
 @pytest.mark.parametrize(
@@ -101,7 +121,7 @@ def test_an_export_answers_as_palpate_does(exporter, name, tmp_path):
     compared = EXPORTERS[exporter](thing, tmp_path)
     assert compared.passed, str(compared)
     wanted = {"energy", "force", "stiffness", "depth", "amplitude", "slope", "flags"}
-    wanted |= {"deviation"} if thing.energy.root is not None else set()
+    wanted |= {"deviation"} if thing.energy.root is not None and exporter != "engine" else set()
     if exporter != "onnx":
         wanted |= {"field"} if thing.fields else set()
         wanted |= {"memory", "stored"} if thing.memory is not None else set()
@@ -183,6 +203,33 @@ def test_a_baseline_of_ones_own_goes_out_as_the_guide_says(tmp_path):
     compared = c_with("gcc", *STRICT, *SANITIZED)(thing, tmp_path)
     assert compared.passed, str(compared)
     assert compared.parts["force"].count > 2000
+
+
+class _Rounded:
+    """An export whose depth is off by a rounding at the surface itself, where Hertz's stiffness goes as its root."""
+
+    def __init__(self, thing, deepest):
+        self.thing, self.deepest = thing, deepest
+
+    def answers(self, X):
+        out = true_answers(self.thing.energy, X)
+        there = np.abs(out[:, 1]) <= self.deepest
+        assert there.any()
+        out[there, 5:14] += 1e-8 * np.nanmax(np.abs(out[:, 5:14]))
+        return out
+
+
+@pytest.mark.full
+def test_of_a_stiffness_at_a_depth_that_is_rounding_nothing_is_said():
+    inputs = (*INPUTS[:2], pp.Range("c_z", 0.05 + RADIUS - DEEPEST, 0.05 + RADIUS, "m"))
+    points, triangles = CORNERS
+    surface = TouchedSurface.of(points + np.array([0.0, 0.0, 0.05]), triangles, radius=RADIUS, spacing=0.003)
+    network = linear_network(list(inputs), [pp.Quantity("ln U/U0")], np.array([[3.0, 0.2, 0.0, 0.0]]))
+    baseline = ContactBaseline(ContactLaw("hertz"), surface, RADIUS)
+    energy = LearntEnergy(network, baseline, continuation=Continuation.of(inputs, deepest=DEEPEST))
+    thing = pp.Surrogate(energy, meta={"name": "hertz"})
+    assert compare_body(thing, _Rounded(thing, 1e-15)).passed
+    assert not compare_body(thing, _Rounded(thing, 1e-6)).passed
 
 
 class _Off:

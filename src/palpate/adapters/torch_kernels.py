@@ -20,6 +20,19 @@ SLOPES = {"energy": "force", "force": "stiffness", "stiffness": ""}
 """Answers of the kernels, and which of them holds the slope of each."""
 
 
+def _slope_of(torch: Any, answers: Any, name: str, x: Any, there: Any) -> Any:
+    """Return ∂U/∂x (N, 3) or ∂F/∂x (N, 3, 3), differentiable again where that is asked for."""
+    answer = answers.apply(x, SLOPES[name])[0] if torch.is_grad_enabled() else there
+    return -answer if name == "energy" else answer
+
+
+def _map_rows(answers: Any, many: Any, name: str) -> tuple[Any, Any]:
+    """Return answers and their slopes at rows (M, N, n)."""
+    rows, slopes = answers.apply(many.reshape(-1, many.shape[-1]), name)
+    shape = many.shape[:2] if SLOPES[name] else (many.shape[0], 0)
+    return rows.reshape(*many.shape[:2], *rows.shape[1:]), slopes.reshape(*shape, *slopes.shape[1:])
+
+
 def kernel_function(torch: Any, body: Surrogate, by_operators: Callable[[str, Any], Any]) -> Any:
     """Return a class of ``torch.autograd.Function`` that answers rows x (N, n) in double precision.
 
@@ -30,12 +43,7 @@ def kernel_function(torch: Any, body: Surrogate, by_operators: Callable[[str, An
     known = not body.parameters  # further inputs have slopes that the kernels do not give
     directions = torch.tensor(np.array(energy.baseline.directions))
 
-    def slope_of(ctx: Any, x: Any, there: Any) -> Any:
-        """Return ∂U/∂x (N, n) or ∂F/∂x (N, 3, n), differentiable again where that is asked for."""
-        answer = Answers.apply(x, SLOPES[ctx.name])[0] if torch.is_grad_enabled() else there
-        return -(answer @ directions.T) if ctx.name == "energy" else answer @ directions.T
-
-    class Answers(torch.autograd.Function):  # type: ignore[misc, name-defined]
+    class Answers(torch.autograd.Function):  # type: ignore[misc]
         """One of `SLOPES` at rows of inputs, by the kernels, and the next."""
 
         @staticmethod
@@ -56,7 +64,7 @@ def kernel_function(torch: Any, body: Surrogate, by_operators: Callable[[str, An
             x, there = ctx.saved_tensors
             if not (known and SLOPES[ctx.name]):
                 return torch.func.vjp(lambda v: by_operators(ctx.name, v), x)[1](weights)[0], None
-            slope = slope_of(ctx, x, there)
+            slope = _slope_of(torch, Answers, ctx.name, x, there) @ directions.T
             return (
                 weights[:, None] * slope if weights.ndim == 1 else torch.einsum("ni,nij->nj", weights, slope)
             ), None
@@ -66,7 +74,7 @@ def kernel_function(torch: Any, body: Surrogate, by_operators: Callable[[str, An
             x, there = ctx.saved_tensors
             if not (known and SLOPES[ctx.name]):
                 return torch.func.jvp(lambda v: by_operators(ctx.name, v), (x,), (step,))[1], None
-            slope = slope_of(ctx, x, there)
+            slope = _slope_of(torch, Answers, ctx.name, x, there) @ directions.T
             return (
                 (slope @ step[..., None])[..., 0] if ctx.name == "force" else (slope * step).sum(-1)
             ), None
@@ -75,12 +83,6 @@ def kernel_function(torch: Any, body: Surrogate, by_operators: Callable[[str, An
         def vmap(
             _info: Any, in_dims: tuple[int, None], x: Any, name: str
         ) -> tuple[tuple[Any, Any], tuple[int, int]]:
-            many = x.movedim(in_dims[0], 0)
-            rows, slopes = Answers.apply(many.reshape(-1, many.shape[-1]), name)
-            shape = many.shape[:2] if SLOPES[name] else (many.shape[0], 0)
-            return (
-                rows.reshape(*many.shape[:2], *rows.shape[1:]),
-                slopes.reshape(*shape, *slopes.shape[1:]),
-            ), (0, 0)
+            return _map_rows(Answers, x.movedim(in_dims[0], 0), name), (0, 0)
 
     return Answers

@@ -52,9 +52,10 @@ _PARTS = {
     "energy": [0],
     "depth": [1],
     "force": [2, 3, 4],
-    "stiffness": list(range(5, 14)),
     "amplitude": [15],
 }
+# the slope of the amplitude, and the stiffness of a body whose energy grows as s^(5/2)
+_ROOTS = {"stiffness": list(range(5, 14)), "slope": [16, 17, 18]}
 _ROUND_OFF = 1e-14  # m, depth that is round-off
 _TOUCHES = 24  # places at which a field is compared, beside the deepest touches
 _STROKE = 300  # steps of a memory's stroke
@@ -234,8 +235,9 @@ def compare_body(
         for name, c in _PARTS.items()
         if there[c].all()
     }
-    if there[16:19].all():
-        parts["slope"] = _slope(energy, X, wanted, got, limit, deep)
+    for name, c in _ROOTS.items():
+        if there[c].all():
+            parts[name] = _root_difference(energy, X, wanted, got, limit, deep, c)
     size = np.linalg.norm(np.nan_to_num(wanted[:, 2:5]), axis=1)
     if deviation and energy.root is not None:
         # relative to the force: nothing can be said where that is nearly none
@@ -276,15 +278,16 @@ def true_answers(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
     return out
 
 
-def _slope(
+def _root_difference(
     energy: LearntEnergy,
     X: np.ndarray,
     wanted: np.ndarray,
     got: np.ndarray,
     limit: np.ndarray,
     deep: np.ndarray,
+    columns: list[int],
 ) -> Difference:
-    """Compare the amplitude's slope, which goes as a root of the depth s = R − d of a probe.
+    """Compare columns that go as a root of the depth s = R − d of a probe: see `_ROOTS`.
 
     Its condition at first contact is that of this difference, and where s itself is round-off nothing can be said.
     """
@@ -293,7 +296,6 @@ def _slope(
         chosen = chosen & ~(np.abs(s) < _ROUND_OFF)
         of_depth = np.abs(2.0 * _radii(energy, X) - s) / np.maximum(np.abs(s), _ROUND_OFF)
         limit = np.maximum(limit, np.minimum(_TIGHT * np.nan_to_num(of_depth, nan=1.0), _LOOSEST))
-    columns = [16, 17, 18]
     return difference(wanted[chosen][:, columns], got[chosen][:, columns], limit[chosen])
 
 

@@ -21,10 +21,12 @@ from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 
-from palpate.errors import ResourceError
+from palpate.errors import ResourceError, UsageError
 from palpate.export.core_source import generic_source
+from palpate.export.weights_block import HEAD, WeightsBlock
+from palpate.surrogates import Surrogate
 
-__all__ = ["build_binaries", "built_binaries", "engine_libraries", "fmu_source", "main"]
+__all__ = ["build_binaries", "built_binaries", "engine_libraries", "fmu_source", "main", "require_generic"]
 
 _SOURCES = (
     "memory_states.c",
@@ -90,6 +92,22 @@ def engine_libraries() -> dict[str, bytes]:
         ".dll": kept["x86_64-windows/.dll"],
         ".dylib": _universal(parts),
     }
+
+
+def require_generic(surrogate: Surrogate, block: WeightsBlock, program: str) -> None:
+    """Refuse a body whose baseline or memory is not compiled into the generic binaries."""
+    _, _, baseline, memory = block.tables[HEAD].values[:4].tolist()
+    own = surrogate.memory
+    if baseline and (own is None or memory):
+        return
+    kind = f"baseline {surrogate.hand_energy.baseline.name!r}"
+    if baseline and own is not None:
+        kind = f"memory {own.name!r}"
+    raise UsageError(
+        f"The {kind} is not in the generic {program}.",
+        why="That is built beforehand, of palpate's own baselines and memories.",
+        fix="Take the body out as C99, which compiles the C source of your own.",
+    )
 
 
 def built_binaries(version: str = "3.0") -> dict[str, bytes]:

@@ -23,7 +23,7 @@ from palpate.export.check_answers import compare_answers
 from palpate.export.check_fmu import CheckFmu
 from palpate.export.check_points import Comparison, compare_body
 from palpate.export.core_source import fill_template
-from palpate.export.fmu_binaries import built_binaries, fmu_source
+from palpate.export.fmu_binaries import built_binaries, fmu_source, require_generic
 from palpate.export.fmu_description import SOURCE, Described, build_description, model_description
 from palpate.export.fmu_variables import (
     answer_variables,
@@ -200,15 +200,7 @@ def _body(
             fix="Leave --at-nodes, --means and --extremes out, or take the field out as C99.",
         )
     block = WeightsBlock.of(surrogate, deviation=deviation)
-    _, _, baseline, memory = block.tables[0].values[:4].tolist()
-    if baseline == 0 or (surrogate.memory is not None and memory == 0):
-        kind = f"baseline {surrogate.hand_energy.baseline.name!r}"
-        kind = kind if baseline == 0 or surrogate.memory is None else f"memory {surrogate.memory.name!r}"
-        raise UsageError(
-            f"The {kind} is not in the generic binary of FMUs.",
-            why="That binary is built beforehand, of palpate's own baselines and memories.",
-            fix="Take the body out as C99, which compiles the C source of your own.",
-        )
+    require_generic(surrogate, block, "binary of FMUs")
     words = str(surrogate).splitlines()[0]
     if carried is None:
         return block, Described(name, words, body_variables(surrogate), has_exchange(surrogate))

@@ -21,7 +21,7 @@ from palpate.export.check_engine import CheckEngine, engine_library
 from palpate.export.check_points import Comparison, compare_body
 from palpate.export.core_source import fill_template
 from palpate.export.engine_scene import press_ends, probe_radius, require_touch, shown_mesh, tool_words
-from palpate.export.fmu_binaries import engine_libraries
+from palpate.export.fmu_binaries import engine_libraries, require_generic
 from palpate.export.package_folder import ExportedPackage, write_package
 from palpate.export.weights_block import WeightsBlock, identifier
 from palpate.surrogates import FieldSurrogate, Surrogate
@@ -87,6 +87,7 @@ def _checked_block(surrogate: Surrogate, *, check: bool) -> tuple[WeightsBlock, 
     block = block_of(
         surrogate, field=None if mesh is None else mesh.name, with_field=mesh is not None, deviation=False
     )
+    require_generic(surrogate, block, "library of engines")
     library = engine_library() if check else None
     if library is None:
         return block, None

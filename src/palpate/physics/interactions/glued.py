@@ -87,13 +87,7 @@ class GluedPad(PlainInteraction):
     name: str = ""
 
     def __post_init__(self) -> None:
-        if self.pad == RIGID:
-            raise UsageError(
-                "A glued pad is asked to be rigid.",
-                why=NO_RIGID_GRIP,
-                fix="Give a stiffness in N/m³, or prescribe the displacement of a part of the surface: "
-                "PrescribedDisplacement(…, within=…).",
-            )
+        _require_soft(self.pad)
         checks.positive("The stiffness of a glued pad", self.pad, "N/m³")
         for what, size in (("radius of a glued pad", self.radius), ("element under a pad", self.element)):
             if size is not None:
@@ -203,6 +197,17 @@ def _placement(pad: GluedPad, mesh: BodyMesh) -> tuple[Chart | None, np.ndarray,
         lower, upper = (np.asarray(corner) for corner in pad.over or (nowhere, nowhere))
     require_on_surface(mesh, chart, lower, upper, pad.radius)
     return chart, lower, upper
+
+
+def _require_soft(pad: Any) -> None:
+    """Refuse the word that makes a ball rigid."""
+    if pad == RIGID:
+        raise UsageError(
+            "A glued pad is asked to be rigid.",
+            why=NO_RIGID_GRIP,
+            fix="Give a stiffness in N/m³, or prescribe the displacement of a part of the surface: "
+            "PrescribedDisplacement(…, within=…).",
+        )
 
 
 def _rectangle(value: Any) -> tuple[Corner, Corner]:

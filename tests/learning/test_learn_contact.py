@@ -280,6 +280,19 @@ def test_what_makes_no_sense_is_refused(surface):
         learn_energy(solves(X, U, F, K), baseline, networks=0)
 
 
+def test_a_press_that_ends_before_an_elements_flat_face_is_one_without_contact(surface):
+    """Elements h leave gaps of up to h²/8R, a quarter of `resolved`; deeper, a press without energy is a mistake."""
+    X, U, F, K = touches(6)
+    baseline = ContactBaseline(LAW, surface, RADIUS, resolved=1.6e-3)
+    for s, is_gap in ((3.5e-4, True), (4.5e-4, False)):
+        X[2, 2], U[2] = RADIUS - s, 0.0
+        if is_gap:
+            assert list(EnergySamples.of(solves(X, U, F, K), baseline).numbers) == [0, 1, 3, 4, 5]
+        else:
+            with pytest.raises(UsageError, match="stored no energy"):
+                EnergySamples.of(solves(X, U, F, K), baseline)
+
+
 MODULUS = Range("E", 5e3, 20e3, "Pa")
 
 

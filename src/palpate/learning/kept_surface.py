@@ -20,7 +20,7 @@ __all__ = ["touched_overlap", "touched_surface"]
 NAME = ".touched_surface"  # in the folder of the store, where Zarr looks for no array
 KIND = "touched-surface"
 OVERLAP_NAME, OVERLAP_KIND = ".overlap", "overlap"
-OVERLAP_BUILT = 1
+OVERLAP_BUILT = 2
 BUILT = 3  # another number where distances of the same surface are built otherwise
 
 
@@ -50,12 +50,15 @@ def touched_surface(
 
 
 def touched_overlap(
-    data: Dataset, surface: TouchedSurface, points: np.ndarray, triangles: np.ndarray
+    data: Dataset, surface: TouchedSurface, points: np.ndarray, triangles: np.ndarray, *, straight: bool
 ) -> Overlap | None:
-    """Return the overlap of a ball on a surface made of these triangles, kept beside its distance; None if flat."""
+    """Return the overlap of a ball on a surface made of these triangles, kept beside its distance; None if flat.
+
+    `straight` says whether the solved faces are the flat triangles themselves.
+    """
     if surface.profile.size:
         return None
-    digest = hashlib.sha256(f"{OVERLAP_BUILT}".encode())
+    digest = hashlib.sha256(f"{OVERLAP_BUILT} {straight}".encode())
     for array in (points[triangles], surface.coefficients):
         digest.update(np.ascontiguousarray(array).tobytes())
     path = None if data.folder is None else data.folder / OVERLAP_NAME
@@ -63,7 +66,7 @@ def touched_overlap(
     if tensors is not None:
         with contextlib.suppress(KeyError, ValueError):
             return Overlap.from_arrays(surface, tensors)
-    overlap = Overlap.of(surface, points, triangles)
+    overlap = Overlap.of(surface, points, triangles, straight=straight)
     if path is not None and overlap is not None:
         with contextlib.suppress(UsageError):
             write_container(path, Container(OVERLAP_KIND, digest.hexdigest(), overlap.arrays()))

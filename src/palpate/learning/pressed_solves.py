@@ -183,7 +183,9 @@ class PressedSolves:
         """Return the baselines by the ball's overlap; none over a flat surface, or where the radius is an input."""
         if self.radius_input is not None:
             return []
-        overlap, own = touched_overlap(self.data, self.surface, *self.skin), self.baseline
+        # elements of a surface's file are straight, and keep their middles beside it; a ball feels their flat faces
+        straight = has_middles(self.data)
+        overlap, own = touched_overlap(self.data, self.surface, *self.skin, straight=straight), self.baseline
         if overlap is None:
             return []
         parts = own.law, own.touched, own.probe_radius, None, own.resolved

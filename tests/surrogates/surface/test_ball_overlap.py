@@ -81,6 +81,21 @@ def test_a_touch_begins_where_the_surface_does():
         assert d == pytest.approx(surface.at((LARGE + R) * directions(300))[0], abs=2e-6)
 
 
+def test_over_straight_faces_the_equivalent_depth_is_that_in_the_face():
+    """In the middle of a face that is wider than the contact, the surface through the corners lies a gap above it."""
+    radius = R / 2
+    points, triangles = skins.ball(LARGE, 5)
+    surface = TouchedSurface.of(points, triangles, radius=radius)
+    field = Overlap.of(surface, points, triangles, straight=True).field(1.0)
+    middles = points[triangles].mean(axis=1)
+    heights = np.linalg.norm(middles, axis=1)
+    widest = np.argsort(heights)[:8]  # the lowest in the ball, so the widest
+    outward, gap = middles[widest] / heights[widest, None], LARGE - heights[widest]
+    for depth in (0.75e-3, 0.9e-3):
+        e = field.at((LARGE + radius - gap - depth)[:, None] * outward)[0]
+        assert radius - e == pytest.approx(depth, rel=0.1)
+
+
 def test_no_weight_of_the_overlap_is_the_distance():
     surface, overlap = of_sphere(False)
     assert np.array_equal(overlap.field(0.0).coefficients, surface.coefficients)

@@ -35,7 +35,7 @@ import numpy as np
 
 from palpate.kernels import kernel, part
 from palpate.network.packing import pack, unpack
-from palpate.surrogates.surface.curved_patches import Patches, patches_of
+from palpate.surrogates.surface.curved_patches import patches_of
 from palpate.surrogates.surface.distance_table import CLEAR, through_nodes
 from palpate.surrogates.surface.oriented_mesh import OrientedMesh
 from palpate.surrogates.surface.touched_surface import TouchedSurface
@@ -70,7 +70,9 @@ class Overlap:
     log_ratio: np.ndarray
 
     @classmethod
-    def of(cls, surface: TouchedSurface, points: np.ndarray, triangles: np.ndarray) -> Overlap | None:
+    def of(
+        cls, surface: TouchedSurface, points: np.ndarray, triangles: np.ndarray, *, straight: bool = False
+    ) -> Overlap | None:
         """Return the overlap of the ball of radius `surface.radius`; None over a flat surface, where k is 1.
 
         Parameters
@@ -81,14 +83,18 @@ class Overlap:
             In m.
         triangles : (t, 3) int array
             Counter-clockwise as seen from outside.
+        straight : bool
+            Whether the solved body's faces are the flat triangles themselves; by default they follow the curved
+            surface through their corners, as d does.
         """
         if surface.profile.size:
             return None
+        corners, normals = _faces(OrientedMesh.of(points, triangles), straight)
         d = _node_values(surface.coefficients)
         R, outermost = surface.radius, surface.reach + CLEAR * surface.spacing
         near = np.argwhere((d > DEEPEST * R) & (d < outermost))
         places = surface.frame[:3] + surface.spacing * near
-        ratio = _ratios(surface, places, _Pieces.of(patches_of(OrientedMesh.of(points, triangles)), R))
+        ratio = _ratios(surface, places, _Pieces.of(corners, normals, R))
         # k goes over into 1 where nothing is felt any more, outside and deep inside
         here = d[tuple(near.T)]
         share = _smooth_step((outermost - here) / (CLEAR * surface.spacing)) * _smooth_step(
@@ -182,6 +188,17 @@ def _smooth_step(t: np.ndarray) -> np.ndarray:
     return np.asarray(t * t * (3 - 2 * t))
 
 
+def _faces(mesh: OrientedMesh, straight: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners (t, 3, 3) of faces in m and the unit normals (t, 3, 3) at them."""
+    if not straight:
+        patches = patches_of(mesh)
+        return patches.corners, patches.normals
+    corners = mesh.points[mesh.triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = across / np.linalg.norm(across, axis=1, keepdims=True)
+    return corners, np.repeat(normals[:, None], 3, axis=1)
+
+
 @dataclass(frozen=True, eq=False)
 class _Pieces:
     """A surface in small flat pieces, sorted into cubes of a third of the ball's radius."""
@@ -194,8 +211,7 @@ class _Pieces:
     sides: np.ndarray  # (3,) int, cubes along each axis
 
     @classmethod
-    def of(cls, patches: Patches, radius: float) -> _Pieces:
-        corners = patches.corners
+    def of(cls, corners: np.ndarray, corner_normals: np.ndarray, radius: float) -> _Pieces:
         edge = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
         size = radius / FINE
         while (parts := np.maximum(np.ceil(edge / size), 1).astype(np.int64)) @ parts > MOST_PIECES:
@@ -204,7 +220,7 @@ class _Pieces:
         middles, upright, of = [], [], []
         for count in np.unique(parts):
             rows = np.flatnonzero(parts == count)
-            lifted = _lift(corners[rows], patches.normals[rows], _middles(int(count)))
+            lifted = _lift(corners[rows], corner_normals[rows], _middles(int(count)))
             middles.append(lifted[0])
             upright.append(lifted[1])
             of.append(np.repeat(rows, count * count))

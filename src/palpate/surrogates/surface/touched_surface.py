@@ -111,7 +111,7 @@ class TouchedSurface:
         spacing : float, optional
             Of the grid, in m. By default a tenth of the radius (an eighth where a curved surface ends in a
             shoulder, a sixth where it has no end), refined
-            where curvature asks and the grid stays under 2 million nodes.
+            where curvature asks, that makes it more exact, and the grid stays under 2 million nodes.
         shoulder : float, optional
             Radius in m with which the surface rolls off beyond its border; 0 for an edge. With a shoulder the distance
             is as smooth right up to the border as in the middle, which learning asks for; a probe that leaves the

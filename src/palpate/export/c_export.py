@@ -15,7 +15,7 @@ from palpate.export.check_points import Comparison, Precision, compare_body
 from palpate.export.check_program import CheckProgram
 from palpate.export.compilers import find_compiler
 from palpate.export.field_tables import chosen_field
-from palpate.export.weights_block import ROOT, WeightsBlock, identifier
+from palpate.export.weights_block import PLACES, ROOT, WeightsBlock, identifier
 from palpate.files import system_errors, write_file
 from palpate.network import Network
 from palpate.output_files import require_outputs, with_seal
@@ -118,6 +118,8 @@ def export_c(
         If the compiled files differ from palpate by more than they may; nothing is written.
     """
     name = require_name(identifier(_default_name(thing)) if name is None else name)
+    if single and (isinstance(thing, Network) or not thing.can_be_touched):
+        deviation = False  # a form that is small beside its terms is lost in 32 bits
     block = block_of(thing, field=field, with_field=with_field, deviation=deviation)
     texts = c_files(_sources(thing), block, name, single=single)
     card = card_of(thing).with_hash(block.label, block.hash)
@@ -152,7 +154,7 @@ def block_of(
     if isinstance(thing, Network):
         return WeightsBlock.of_network(thing)
     if (answers := answers_of(thing)) is not None:
-        return WeightsBlock.of_answers(answers)
+        return WeightsBlock.of_answers(answers if deviation else answers.without_doubts())
     chosen = chosen_field(thing, field) if with_field else None
     return WeightsBlock.of(thing, field=chosen, deviation=deviation)
 
@@ -173,6 +175,7 @@ def compare_c(
             program = CheckProgram.compile(
                 compiler, done.sources, done.name, Path(folder), network=True, options=options
             )
+            answers = answers if PLACES in block.tables else answers.without_doubts()
             return compare_answers(answers, lambda X: program.replies(X, len(answers.outputs)), precision)
         assert isinstance(thing, Surrogate)
         nodes = thing.fields[block.field].rest.shape if block.field else (0, 0)  # type: ignore[union-attr]

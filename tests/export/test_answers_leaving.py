@@ -249,9 +249,8 @@ def mean_of_networks(seed: int = 0) -> Surrogate:
     """Return numbers of members whose mean answers, and which disagree; made up, with a deviation."""
     rng, part = np.random.default_rng(seed), quantities("gaussian", seed, ("a", "b"))
     net, members = part.network, []
-    for moved in 0.1 * rng.normal(size=(2, *net.weights.shape)):
-        for sign in (1.0, -1.0):  # so that their mean is the network
-            members.append(dataclasses.replace(net, weights=net.weights * (1.0 + sign * moved)))
+    for moved in 0.1 * rng.normal(size=(2, *net.weights.shape)):  # in pairs whose mean is the network
+        members += [dataclasses.replace(net, weights=net.weights * (1.0 + s * moved)) for s in (1.0, -1.0)]
     c = 1 + len(net.inputs) + net.units
     root = rng.normal(size=(c, c)) / 10.0
     nothing = np.zeros((0, 0))

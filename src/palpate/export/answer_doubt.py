@@ -1,4 +1,4 @@
-r"""How sure the answers of one part are, as one network that every export can run.
+r"""The doubt of the answers of one part: how sure they are, as one network that every export can run.
 
 The part's networks give numbers y_k with variances v_k = c_k (1 + φ̃ᵀ M φ̃), φ̃ = [1, ξ, φ]; with M = G S Gᵀ, S being
 signs, the form is a sum of squares of outputs g = Gᵀ φ̃ of a network with the same units. So are the members'
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.network import Network, Scaling
+from palpate.network.uncertainty import Uncertainty
 from palpate.surrogates import LearntQuantities
 from palpate.units import Quantity
 
@@ -85,64 +86,61 @@ def doubt_of(
         return None
     if any(member.radial != net.radial for member in part.members):
         return None
-    n, h, m = len(net.inputs), net.units, len(net.outputs)
-    values, vectors = np.linalg.eigh(sure.coefficients)
-    order = np.argsort(-values)
-    values, vectors = values[order], vectors[:, order]
-    kept = np.abs(values) > _NOTHING * np.abs(values).max(initial=0.0)
-    G = (vectors * np.sqrt(np.abs(values)))[:, kept].T
-    width = len(sure.coefficients) - h if len(sure.coefficients) else 1 + n
-    forms = np.zeros((len(G), 1 + n + h))
-    forms[:, :width], forms[:, 1 + n :] = G[:, :width], G[:, width:]
-    shares = np.zeros((0, 1 + n + h)) if part.influence is None else part.influence.coefficients.T
+    forms, plus = _forms(sure, len(net.inputs), net.units)
+    m, influence = len(net.outputs), part.influence
+    shares = np.zeros((0, forms.shape[1])) if influence is None else influence.coefficients.T
     missed = np.zeros((m, 0))
-    if part.influence is not None:
-        missed = (part.influence.missed.T * net.scaling.output_scale[:, None]) ** 2
-    lines = [np.vstack([forms, shares])]
-    differences = np.zeros((len(part.members) * m, 1 + n + h))
-    for i in range(len(part.members)):
-        differences[i * m : (i + 1) * m] = -_rows_of(net)
-    lines.append(differences)
-    units = [(net.factors, net.shifts), *((member.factors, member.shifts) for member in part.members)]
-    rows = np.vstack(lines)
-    first = len(rows) - len(differences)
-    for i, member in enumerate(part.members):
-        some = slice(first + i * m, first + (i + 1) * m)
-        own = _rows_of(member)
-        rows[some, : 1 + n] += own[:, : 1 + n]
-        more = np.zeros((len(rows), member.units))
-        more[some] = own[:, 1 + n :]
-        rows = np.hstack([rows, more])
-    factors, shifts = _stacked(units)
-    outer, count = net.scaling, len(rows)
-    network = Network(
-        net.inputs,
-        tuple(Quantity(f"g{i}") for i in range(count)) or (Quantity("g0"),),
-        factors,
-        shifts,
-        rows[:, 1 + n :] if count else np.zeros((1, factors.shape[0])),
-        rows[:, : 1 + n] if count else np.zeros((1, 1 + n)),
-        Scaling(
-            outer.input_centre,
-            outer.input_half,
-            np.zeros(max(count, 1)),
-            np.ones(max(count, 1)),
-            outer.input_bend,
-        ),
-        radial=net.radial,
-    )
-    scale = np.broadcast_to(sure.factor, (m,)) * outer.output_scale
-    plus = int((values[kept] > 0.0).sum())
+    if influence is not None:
+        missed = (influence.missed.T * net.scaling.output_scale[:, None]) ** 2
+    scale = np.broadcast_to(sure.factor, (m,)) * net.scaling.output_scale
     return Doubt(
-        network,
+        _network(part, np.vstack([forms, shares])),
         plus,
-        len(G) - plus,
+        len(forms) - plus,
         len(shares),
         len(part.members),
         sure.noise * scale**2,
         missed,
         (widening * np.vstack(matrices)) ** 2,
         widening**2 * np.concatenate(floors),
+    )
+
+
+def _forms(sure: Uncertainty, n: int, h: int) -> tuple[np.ndarray, int]:
+    """Return the rows (q, 1 + n + h) of Gᵀ, those of positive sign first, and how many of these there are."""
+    values, vectors = np.linalg.eigh(sure.coefficients)
+    order = np.argsort(-values)
+    values, vectors = values[order], vectors[:, order]
+    kept = np.abs(values) > _NOTHING * np.abs(values).max(initial=0.0)
+    G = (vectors * np.sqrt(np.abs(values)))[:, kept].T
+    forms, width = np.zeros((len(G), 1 + n + h)), G.shape[1] - h if G.size else 0
+    if G.size:
+        forms[:, :width], forms[:, 1 + n :] = G[:, :width], G[:, width:]
+    return forms, int((values[kept] > 0.0).sum())
+
+
+def _network(part: LearntQuantities, rows: np.ndarray) -> Network:
+    """Return the network of rows (q, 1 + n + h), and of the members' differences from their mean after these."""
+    net, n, m, first = part.network, len(part.network.inputs), len(part.network.outputs), len(rows)
+    rows = np.vstack([rows, *(-_rows_of(net) for _ in part.members)])
+    for i, member in enumerate(part.members):
+        some, own = slice(first + i * m, first + (i + 1) * m), _rows_of(member)
+        rows[some, : 1 + n] += own[:, : 1 + n]
+        more = np.zeros((len(rows), member.units))
+        more[some] = own[:, 1 + n :]
+        rows = np.hstack([rows, more])
+    factors, shifts = _stacked([net, *part.members])
+    rows = rows if len(rows) else np.zeros((1, 1 + n + len(factors)))
+    zero, one, outer = np.zeros(len(rows)), np.ones(len(rows)), net.scaling
+    return Network(
+        net.inputs,
+        tuple(Quantity(f"g{i}") for i in range(len(rows))),
+        factors,
+        shifts,
+        rows[:, 1 + n :],
+        rows[:, : 1 + n],
+        Scaling(outer.input_centre, outer.input_half, zero, one, outer.input_bend),
+        radial=net.radial,
     )
 
 
@@ -163,10 +161,11 @@ def _same_units(one: Network, other: Network) -> bool:
     )
 
 
-def _stacked(units: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+def _stacked(networks: Sequence[Network]) -> tuple[np.ndarray, np.ndarray]:
     """Return factors (h, r, n) and shifts (h, r) of several networks, one after the other."""
-    r = max(factors.shape[1] for factors, _ in units)
+    r = max(net.factors.shape[1] for net in networks)
+    gaps = [(net, (0, r - net.factors.shape[1])) for net in networks]
     return (
-        np.concatenate([np.pad(f, [(0, 0), (0, r - f.shape[1]), (0, 0)]) for f, _ in units]),
-        np.concatenate([np.pad(s, [(0, 0), (0, r - s.shape[1])]) for _, s in units]),
+        np.concatenate([np.pad(net.factors, [(0, 0), gap, (0, 0)]) for net, gap in gaps]),
+        np.concatenate([np.pad(net.shifts, [(0, 0), gap]) for net, gap in gaps]),
     )

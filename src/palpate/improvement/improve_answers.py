@@ -120,14 +120,15 @@ class AnswerImprovement:
         assert self.kept.good is not None
         assert self.kept.data is not None
         answers = DatasetAnswers.of(self.kept.good)
-        parts = [one.values for one in answers.numbers.values()]
-        parts += [one.values.reshape(len(answers.X), -1) for one in answers.fields.values()]
         places = sobol(space, CANDIDATES, self.options.seed + 7919 * (1 + solved))
         failed = self.kept.X[~self.kept.data.converged]
         weights = None if self.interest is None else self.interest(places)
         with threadpool_limits(1):
             return choose_answers(
-                *(parts, answers.X, answers.inputs, size), failed=failed, interest=weights, candidates=places
+                *(answers.tables(), answers.X, answers.inputs, size),
+                failed=failed,
+                interest=weights,
+                candidates=places,
             )
 
     def _learn(self) -> tuple[Surrogate, Any]:

@@ -69,11 +69,18 @@ def _group(facts: Mapping[str, Any], inputs: tuple[Range, ...], read: Read) -> L
 
     def network(parts: Mapping[str, Any]) -> Network:
         centre, half, bend = read(parts["inputs"])
-        names = ("factors", "shifts", "weights", "tail")
-        basis = None if parts["basis"] is None else read(parts["basis"])
-        scaling = Scaling(centre, half, *read(parts["outputs"]), bend)
-        arrays = (read(parts[name]) for name in names)
-        return Network(inputs, outputs, *arrays, scaling, radial=parts["radial"], basis=basis)
+        zero, unit = read(parts["outputs"])
+        return Network(
+            inputs,
+            outputs,
+            read(parts["factors"]),
+            read(parts["shifts"]),
+            read(parts["weights"]),
+            read(parts["tail"]),
+            Scaling(centre, half, zero, unit, bend),
+            radial=parts["radial"],
+            basis=None if parts["basis"] is None else read(parts["basis"]),
+        )
 
     sure, region, influence = facts["deviation"], facts["region"], facts["influence"]
     names = ("noise", "coefficients", "root", "through", "pattern", "factor")

@@ -3,7 +3,7 @@
 Every rival is a function (X (N, n), Y (N, nodes)) → `FieldModel`, inputs scaled to [−1, 1]. It takes a proper
 orthogonal decomposition of the fields; for libraries without one, the leading modes by a singular value decomposition.
 Settings are chosen by a fit on four fifths of the solves and its error on every fifth; so is whether inputs come as
-they are or as their logarithms, which palpate too decides by solves left out.
+they are, as their logarithms or as their inverses, which palpate too decides by solves left out, for each input.
 """
 
 from __future__ import annotations
@@ -30,6 +30,12 @@ class FieldModel:
 
 
 Fit = Callable[[np.ndarray, np.ndarray], FieldModel]
+# inputs, all that are positive in the same way
+_WAYS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
+    "inputs as they are": lambda X, positive: X,
+    "logarithms of inputs": lambda X, positive: np.where(positive, np.log(np.where(positive, X, 1.0)), X),
+    "inverses of inputs": lambda X, positive: np.where(positive, 1.0 / np.where(positive, X, 1.0), X),
+}
 _MODES = 6  # more of them change no figure here
 _RANKS = (3, _MODES)  # of EZyRB, one of whose processes is of all modes together
 
@@ -179,21 +185,17 @@ def best_of(
     inputs: Sequence[Range],
 ) -> FieldModel:
     """Return the choice that misses least of every fifth solve, fitted to all, of inputs X (N, n) in SI units."""
-    low, high = bounds(inputs)
-    positive = low > 0.0
+    ends = bounds(inputs)
+    positive = ends[0] > 0.0
 
-    def scaled(X: np.ndarray, *, logs: bool) -> np.ndarray:
-        taken = [np.log(a) if logs and one else a for a, one in zip(X.T, positive, strict=True)]
-        ends = [
-            (np.log(a), np.log(b)) if logs and one else (a, b)
-            for a, b, one in zip(low, high, positive, strict=True)
-        ]
-        return np.stack([(2.0 * x - a - b) / (b - a) for x, (a, b) in zip(taken, ends, strict=True)], axis=1)
+    def scaled(X: np.ndarray, way: str) -> np.ndarray:
+        low, high = (_WAYS[way](end, positive) for end in ends)
+        return np.asarray((2.0 * _WAYS[way](X, positive) - low - high) / (high - low))
 
     held = np.arange(len(X)) % 5 == 2
-    best: tuple[float, Fit, bool] | None = None
-    for logs in (False, True) if positive.any() else (False,):
-        Z = scaled(X, logs=logs)
+    best: tuple[float, Fit, str] | None = None
+    for way in _WAYS:
+        Z = scaled(X, way)
         for fit in choices(Z, Y):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of optimisers at the ends of their ranges
@@ -207,14 +209,13 @@ def best_of(
                     continue
             error = float(np.sqrt((missed**2).mean()))
             if best is None or error < best[0]:
-                best = error, fit, logs
+                best = error, fit, way
     assert best is not None
-    _, fit, logs = best
+    _, fit, way = best
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        model = fit(scaled(X, logs=logs), Y)
-    settings = f"{model.settings}, {'logarithms of inputs' if logs else 'inputs as they are'}"
-    return FieldModel(lambda Q: model.predict(scaled(Q, logs=logs)), settings)
+        model = fit(scaled(X, way), Y)
+    return FieldModel(lambda Q: model.predict(scaled(Q, way)), f"{model.settings}, {way}")
 
 
 _KNOWN = {"EZyRB": (_ezyrb, "ezyrb"), "SMT": (_smt, "smt"), "OpenTURNS": (_openturns, "openturns")}

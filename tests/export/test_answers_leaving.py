@@ -13,15 +13,17 @@ import pytest
 from fmpy.validation import validate_fmu
 
 import palpate as pp
-from answering import RANGES, answering
+from answering import RANGES, answering, rod_solves
 from palpate.errors import UsageError
 from palpate.export import Choice, WeightsBlock, export_c, export_fmu, export_lib
 from palpate.export.answer_network import answer_network, answers_of
 from palpate.export.check_fmu import open_instance
+from palpate.export.check_library import _module
 from palpate.export.fmu_export import VERSIONS
 from palpate.export.onnx_export import export_onnx
 from palpate.learning.arrays.input_bends import log_bend
 from palpate.network import Network, Scaling, TrainedRegion
+from palpate.network.uncertainty import Uncertainty
 from palpate.surrogates import LearntQuantities, Surrogate
 from palpate.units import Quantity, bounds
 
@@ -128,7 +130,8 @@ def test_an_fmu_of_a_fit_is_the_network(tmp_path):
     Z = np.random.default_rng(1).uniform(0.0, 1.0, (1000, 2))
     got, _ = asked(done.path, Z)
     wanted = fit.predict(Z)
-    np.testing.assert_allclose(np.column_stack(list(got.values())), wanted, atol=1e-9 * np.abs(wanted).max())
+    told = np.column_stack([values for name, values in got.items() if not name.endswith("_deviation")])
+    np.testing.assert_allclose(told, wanted, atol=1e-9 * np.abs(wanted).max())
 
 
 def test_its_directional_derivatives_are_those_of_the_networks(tmp_path):
@@ -235,3 +238,66 @@ def test_a_changed_script_stays(tmp_path):
     (tmp_path / "run_fmu.py").write_text("print('mine')\n")
     export_fmu(answering(), tmp_path / "rod.fmu", check=False)
     assert (tmp_path / "run_fmu.py").read_text() == "print('mine')\n"
+
+
+def rod() -> Surrogate:
+    """Return a number, a curve and a field learnt from few solves, which state their deviations."""
+    return pp.learn(rod_solves(names=("largest", "temperature", "rise")), name="rod")[0]
+
+
+def mean_of_networks(seed: int = 0) -> Surrogate:
+    """Return numbers of members whose mean answers, and which disagree; made up, with a deviation."""
+    rng, part = np.random.default_rng(seed), quantities("gaussian", seed, ("a", "b"))
+    net, members = part.network, []
+    for moved in 0.1 * rng.normal(size=(2, *net.weights.shape)):  # in pairs whose mean is the network
+        members += [dataclasses.replace(net, weights=net.weights * (1.0 + s * moved)) for s in (1.0, -1.0)]
+    c = 1 + len(net.inputs) + net.units
+    root = rng.normal(size=(c, c)) / 10.0
+    nothing = np.zeros((0, 0))
+    sure = Uncertainty(
+        net, np.array([1e-3, 2e-3]), root @ root.T, nothing, np.zeros((c, 0)), np.zeros((2, 0))
+    )
+    sure = dataclasses.replace(sure, pattern=np.zeros((2, 0), dtype=np.int64), factor=np.array([1.1, 1.2]))
+    return Surrogate(
+        meta={"name": "mean"},
+        quantities={"mean": dataclasses.replace(part, uncertainty=sure, members=tuple(members))},
+    )
+
+
+@pytest.mark.parametrize("made", [rod, mean_of_networks])
+def test_deviations_and_trust_leave_with_the_answers(made, tmp_path):
+    """Of few samples, and of members that disagree: in an FMU and in the compiled C, as palpate has them."""
+    surrogate, X = made(), places(300)
+    done = export_fmu(surrogate, tmp_path / "made.fmu", choice=Choice(nodes=(3, 7)) if made is rod else None)
+    got, inside = asked(done.path, X)
+    wanted = dict(zip([q.name for q in surrogate.outputs], _deviations(surrogate, X).T, strict=True))
+    if made is rod:
+        wanted |= {f"temperature_{i}": surrogate.fields["temperature"].deviation(X)[:, i, 0] for i in (3, 7)}
+    trusted = surrogate.trusted(X)
+    near = np.zeros(len(X), bool)
+    for doubt in answers_of(surrogate).doubts:
+        near |= doubt.is_close(X)
+    np.testing.assert_array_equal(inside[~near], trusted[~near])
+    assert 0 < trusted.sum() < len(X)
+    for name, values in wanted.items():
+        # small beside the terms that it is the difference of
+        np.testing.assert_allclose(got[f"{name}_deviation"], values, rtol=0.02, err_msg=name)
+    (wrapper,) = [path for path in export_lib(surrogate, tmp_path / "made").wrappers if path.suffix == ".py"]
+    model = _module(wrapper).Model()
+    for x, values in zip(X[:20].tolist(), _deviations(surrogate, X[:20]), strict=True):
+        np.testing.assert_allclose(model.deviation(x)[: len(values)], values, rtol=0.02)
+
+
+def test_the_deviation_of_an_extreme_is_that_of_its_place(tmp_path):
+    surrogate, X = rod(), places(50)
+    got, _ = asked(
+        export_fmu(surrogate, tmp_path / "rod.fmu", choice=Choice(extremes=("temperature",))).path, X
+    )
+    shown = surrogate.fields["temperature"]
+    values, deviation = shown.values(X)[..., 0], shown.deviation(X)[..., 0]
+    wanted = deviation[np.arange(len(X)), values.argmax(axis=1)]
+    np.testing.assert_allclose(got["temperature_max_deviation"], wanted, rtol=0.02)
+
+
+def _deviations(surrogate: Surrogate, X: np.ndarray) -> np.ndarray:
+    return np.hstack([part.deviation(X) for part in surrogate.quantities.values()])

@@ -13,17 +13,22 @@ The largest and the least value of a field are no outputs of a network: they are
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.export.answer_doubt import Doubt, doubt_of
 from palpate.format import count as count_of
 from palpate.network import Network, Scaling, TrainedRegion
 from palpate.surrogates import LearntQuantities, ModalField, Surrogate
 from palpate.units import Quantity, Range
 
-__all__ = ["AnswerNetwork", "Choice", "answer_network", "answers_of"]
+__all__ = ["MOST_DOUBTS", "AnswerNetwork", "Choice", "answer_network", "answers_of"]
+
+
+MOST_DOUBTS = 4
+"""Parts of whose deviations there is room in a block of weights."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +78,10 @@ class AnswerNetwork:
     runs: tuple[_Run, ...]
     regions: tuple[TrainedRegion, ...]
     groups: tuple[int, ...]
+    # how sure each part is, and of each of the networks' outputs the part and the row in it, (outputs, 2); nothing
+    # where a part can't say
+    doubts: tuple[Doubt, ...] = ()
+    rows: np.ndarray | None = None
 
     def __str__(self) -> str:
         names = ", ".join(str(r) for r in self.inputs)
@@ -82,6 +91,10 @@ class AnswerNetwork:
     def inputs(self) -> tuple[Range, ...]:
         """Names, units and trained ranges of the inputs."""
         return self.networks[0].inputs
+
+    def without_doubts(self) -> AnswerNetwork:
+        """Return the same answers without deviations, trusted wherever they are near what was learnt from."""
+        return replace(self, doubts=(), rows=None)
 
     @property
     def count(self) -> int:
@@ -107,12 +120,28 @@ class AnswerNetwork:
         """Return the derivatives (m, n) of the networks' outputs at x (n,)."""
         return np.asarray(np.sum([network.jacobian(x) for network in self.networks], axis=0))
 
+    def deviation(self, X: np.ndarray) -> np.ndarray:
+        """Return the standard deviations (N, m) of the answers at X (N, n); not-a-number where a part can't say."""
+        if self.rows is None:
+            return np.full((len(X), len(self.outputs)), np.nan)
+        each = [doubt.deviation(X) for doubt in self.doubts]
+        of_outputs = np.stack([each[part][:, row] for part, row in self.rows], axis=1)
+        Y = np.sum([network.predict(X) for network in self.networks], axis=0)
+        columns = [of_outputs[:, : self.count]]
+        for run in self.runs:
+            some = Y[:, run.first : run.first + run.count]
+            best = run.first + (some.argmax(axis=1) if run.largest else some.argmin(axis=1))
+            columns.append(of_outputs[np.arange(len(X)), best][:, None])
+        return np.hstack(columns)
+
     def inside(self, X: np.ndarray) -> np.ndarray:
-        """Return which of X (N, n) are in the trained regions of all parts, (N,) bool."""
+        """Return which of X (N, n) are in the trained regions of all parts, whose networks agree there, (N,) bool."""
         xi = self.networks[0].scaling.scale_inputs(X)
+        agree = np.all([doubt.agrees(X) for doubt in self.doubts], axis=0) if self.doubts else True
         if not self.regions:
-            return np.asarray((np.abs(xi) <= 1.0 + 1e-9).all(axis=1))
-        return np.asarray(np.all([region.distances(xi) <= region.radius for region in self.regions], axis=0))
+            return np.asarray((np.abs(xi) <= 1.0 + 1e-9).all(axis=1) & agree)
+        near = np.all([region.distances(xi) <= region.radius for region in self.regions], axis=0)
+        return np.asarray(near & agree)
 
 
 @dataclass(frozen=True)
@@ -123,6 +152,8 @@ class _Rows:
     outputs: tuple[Quantity, ...]
     offset: np.ndarray
     matrix: np.ndarray
+    scatter: np.ndarray  # (m,), standard deviation that comes on top
+    widening: float = 1.0  # of all deviations
 
 
 def answers_of(surrogate: Surrogate) -> AnswerNetwork | None:
@@ -165,7 +196,31 @@ def _assemble(
 ) -> AnswerNetwork:
     networks = _join([*rows, *hidden])
     groups = tuple(len(row.outputs) for row in rows)
-    return AnswerNetwork(surrogate.name, networks, runs, _regions([*rows, *hidden]), groups)
+    doubts, places = _doubts([*rows, *hidden])
+    return AnswerNetwork(surrogate.name, networks, runs, _regions([*rows, *hidden]), groups, doubts, places)
+
+
+def _doubts(rows: Sequence[_Rows]) -> tuple[tuple[Doubt, ...], np.ndarray | None]:
+    """Return how sure the parts are, and the part and row of each output; nothing where a part can't say."""
+    parts = list({id(row.part): row.part for row in rows}.values())
+    made: list[Doubt] = []
+    places = [np.zeros((len(row.outputs), 2), dtype=np.int64) for row in rows]
+    for i, part in enumerate(parts):
+        own = [k for k, row in enumerate(rows) if row.part is part]
+        doubt = doubt_of(
+            part,
+            [rows[k].matrix for k in own],
+            [rows[k].scatter ** 2 for k in own],
+            rows[own[0]].widening,
+        )
+        if doubt is None or len(made) >= MOST_DOUBTS:
+            return (), None
+        first = 0
+        for k in own:
+            places[k][:, 0], places[k][:, 1] = i, np.arange(first, first + len(places[k]))
+            first += len(places[k])
+        made.append(doubt)
+    return tuple(made), np.vstack(places)
 
 
 def _require_fields(surrogate: Surrogate, flat: dict[str, ModalField], choice: Choice) -> None:
@@ -196,7 +251,7 @@ def _require_fields(surrogate: Surrogate, flat: dict[str, ModalField], choice: C
 def _numbers(surrogate: Surrogate) -> Iterator[_Rows]:
     for part in surrogate.quantities.values():
         m = len(part.outputs)
-        yield _Rows(part, part.outputs, np.zeros(m), np.eye(m))
+        yield _Rows(part, part.outputs, np.zeros(m), np.eye(m), np.zeros(m))
 
 
 def _label(shown: ModalField, component: int) -> str:
@@ -209,7 +264,11 @@ def _values(shown: ModalField, places: Sequence[int], component: int | None = No
     names = tuple(Quantity(f"{_label(shown, c)}_{place}", shown.unit) for place in places for c in chosen)
     index = np.ix_(list(places), chosen)
     modes = np.stack([mode[index].ravel() for mode in shown.modes], axis=1)
-    return _Rows(shown.coefficients, names, shown.mean[index].ravel(), modes)
+    return _Rows(
+        *(shown.coefficients, names, shown.mean[index].ravel(), modes),
+        scatter=shown.scatter[index].ravel(),
+        widening=shown.widening,
+    )
 
 
 def _mean(shown: ModalField) -> _Rows:
@@ -221,6 +280,8 @@ def _mean(shown: ModalField) -> _Rows:
         tuple(Quantity(f"{name}_mean", shown.unit) for name in names),
         shown.mean.mean(axis=0),
         modes,
+        shown.scatter.mean(axis=0),  # as if what the modes miss were missed everywhere at once
+        shown.widening,
     )
 
 

@@ -15,7 +15,7 @@ from palpate.export.check_points import Comparison, Precision, compare_body
 from palpate.export.check_program import CheckProgram
 from palpate.export.compilers import find_compiler
 from palpate.export.field_tables import chosen_field
-from palpate.export.weights_block import ROOT, WeightsBlock, identifier
+from palpate.export.weights_block import PLACES, ROOT, WeightsBlock, identifier
 from palpate.files import system_errors, write_file
 from palpate.network import Network
 from palpate.output_files import require_outputs, with_seal
@@ -119,6 +119,8 @@ def export_c(
     """
     surrogate = Surrogate.of(thing)
     name = require_name(identifier(surrogate.name) if name is None else name)
+    if single and not surrogate.can_be_touched:
+        deviation = False  # a form that is small beside its terms is lost in 32 bits
     block = block_of(surrogate, field=field, with_field=with_field, deviation=deviation)
     texts = c_files(surrogate, answers_of(surrogate), block, name, single=single)
     card = card_of(surrogate).with_hash(block.label, block.hash)
@@ -149,7 +151,7 @@ def _write(folder: Path, texts: dict[str, str]) -> tuple[Path, ...]:
 def block_of(surrogate: Surrogate, *, field: str | None, with_field: bool, deviation: bool) -> WeightsBlock:
     """Return the weights of a surrogate; an error where a part of it has no C source."""
     if (answers := answers_of(surrogate)) is not None:
-        return WeightsBlock.of_answers(answers)
+        return WeightsBlock.of_answers(answers if deviation else answers.without_doubts())
     chosen = chosen_field(surrogate, field) if with_field else None
     return WeightsBlock.of(surrogate, field=chosen, deviation=deviation)
 
@@ -170,6 +172,7 @@ def compare_c(
             program = CheckProgram.compile(
                 compiler, done.sources, done.name, Path(folder), network=True, options=options
             )
+            answers = answers if PLACES in block.tables else answers.without_doubts()
             return compare_answers(answers, lambda X: program.replies(X, len(answers.outputs)), precision)
         nodes = surrogate.surface_fields[block.field].rest.shape if block.field else (0, 0)
         program = CheckProgram.compile(

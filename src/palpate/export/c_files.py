@@ -9,9 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.export.answer_network import AnswerNetwork
+from palpate.export.answer_network import MOST_DOUBTS, AnswerNetwork
 from palpate.export.core_source import core_source, fill_template
-from palpate.export.weights_block import ANSWER_NETS, ARRAYS, FIELD, NET, POINTS, ROOT, Table, WeightsBlock
+from palpate.export.weights_block import (
+    ANSWER_NETS,
+    ARRAYS,
+    DOUBT_ARRAYS,
+    DOUBTS,
+    FIELD,
+    NET,
+    POINTS,
+    ROOT,
+    Table,
+    WeightsBlock,
+)
 from palpate.surrogates import Surrogate
 from palpate.units import Quantity, Range
 
@@ -155,7 +166,11 @@ def _costs(facts: _Facts) -> list[str]:
 def _latent(block: WeightsBlock) -> int:
     """Return the latent outputs of the largest network."""
     places = ANSWER_NETS if not block.baseline else (NET,)
-    return max(int(block.tables[place].values[4]) for place in places if place in block.tables)
+    rooms = [int(block.tables[place].values[4]) for place in places if place in block.tables]
+    if not block.baseline:  # latent outputs of a doubt, then variances
+        doubts = [block.tables.get(DOUBTS + DOUBT_ARRAYS * i) for i in range(MOST_DOUBTS)]
+        rooms += [int(table.values[4] + table.values[11]) for table in doubts if table is not None]
+    return max(rooms)
 
 
 def _stack_bytes(facts: _Facts) -> int:
@@ -216,7 +231,7 @@ def _source(facts: _Facts) -> str:
     first = f'#include "{facts.name}.h"\n' + ("#define PP_SINGLE\n" if facts.single else "")
     tables, external = [], []
     for place, table in _tables_to_store(facts.block):
-        if place >= FIELD:
+        if place >= FIELD and facts.block.field:
             external += [
                 f"extern const {kind} {declarator};" for kind, declarator, _ in _parts(facts, place, table)
             ]

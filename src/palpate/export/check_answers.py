@@ -14,17 +14,24 @@ __all__ = ["MOST_SLOPES", "Replies", "answer_places", "compare_answers"]
 
 
 _NUMBERS = 5_000_000  # numbers that are compared at most; of a large field at fewer places than 1,000
+_END = 0.95  # of the way to the end of a bent scale
 MOST_SLOPES = 2_000  # outputs of which derivatives are compared, too
 
 Replies = tuple[np.ndarray, np.ndarray | None, np.ndarray | None]
 
 
 def answer_places(answers: AnswerNetwork) -> np.ndarray:
-    """Return inputs (N, n), in the ranges and outside of them by up to three tenths: 1,000, of a large field fewer."""
+    """Return inputs (N, n), in the ranges and outside of them by up to three tenths: 1,000, of a large field fewer.
+
+    Of inputs whose scale is bent that is in the scale: beside its end answers are sums of large terms.
+    """
     low, high = bounds(answers.inputs)
     span, most = high - low, _NUMBERS // len(answers.outputs)
-    count = max(20, min(1000, most))
-    return np.random.default_rng(0).uniform(low - 0.3 * span, high + 0.3 * span, (count, len(low)))
+    count, scaling = max(20, min(1000, most)), answers.networks[0].scaling
+    xi = np.random.default_rng(0).uniform(-1.6, 1.6, (count, len(low)))
+    bend = scaling.input_bend
+    xi = np.where(bend * xi > _END, _END / np.where(bend == 0.0, 1.0, bend), xi)
+    return np.asarray(np.clip(scaling.unscale_inputs(xi), low - 0.3 * span, high + 0.3 * span))
 
 
 def compare_answers(
@@ -41,7 +48,8 @@ def compare_answers(
     wanted, (got, inside, slopes) = answers.predict(X), ask(X)
     limit = np.max([tolerances(network, X, precision) for network in answers.networks], axis=0)
     parts, first = {}, 0
-    for count in (*answers.groups, *(1 for _ in answers.runs)):
+    pairs = (2 for _ in range(len(answers.runs) // 2))  # largest and least value of a field: of one size
+    for count in (*answers.groups, *pairs):
         some = slice(first, first + count)
         parts[answers.outputs[first].name] = difference(wanted[:, some], got[:, some], limit)
         first += count
@@ -62,5 +70,7 @@ def _inside(answers: AnswerNetwork, X: np.ndarray, inside: np.ndarray) -> Differ
     for sign in (-1e-11, 1e-11):
         for step in np.diag(sign * span):
             near |= answers.inside(X + step) != wanted
+    for doubt in answers.doubts:
+        near |= doubt.is_close(X)
     wrong = int(((inside != wanted) & ~near).sum())
     return Difference(float(wrong > 0), 0.0, int((~near).sum()), wrong)

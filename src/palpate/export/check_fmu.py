@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.errors import ResourceError
 from palpate.export.check_points import ANSWERS, CONTACT, NOT_A_NUMBER, TOO_DEEP, TRUSTED
-from palpate.export.fmu_variables import ANSWER
+from palpate.export.fmu_variables import ANSWER, ANSWER_DEVIATION
 
 __all__ = ["CheckFmu", "FmuInstance", "open_instance"]
 
@@ -160,7 +160,7 @@ class CheckFmu:
             if v.valueReference in _PARAMETERS and v.causality == "parameter"
         ]
         self._inputs = [v.valueReference for v in variables if v.causality == "input"]
-        self._answers = [v.valueReference for v in variables if v.valueReference >= ANSWER]
+        self._answers = [v.valueReference for v in variables if ANSWER <= v.valueReference < ANSWER_DEVIATION]
         # ways of a mass along the felt directions, and these directions
         self._ways = [v.valueReference for v in variables if v.name.startswith("way_")]
         self._remembers = any(v.name == "stored" for v in variables)

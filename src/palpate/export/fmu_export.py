@@ -96,6 +96,7 @@ class ExportedFmu:
                 comparison = compare_body(surrogate, fmu, deviation=certain, partial=True)
             else:
                 answers = answer_network(surrogate, choice or Choice())
+                answers = answers if self.deviation else answers.without_doubts()
                 comparison = compare_answers(answers, fmu.outputs)
         why, fix = "Its binary or this machine may bend the arithmetic.", "Report this: it must not be used."
         comparison.require("The FMU does", why=why, fix=fix)
@@ -141,7 +142,7 @@ def export_fmu(
     fmi : str
         Version of FMI: "2.0", which most importers take, or "3.0".
     deviation : bool
-        Whether the deviation of the force goes out.
+        Whether deviations go out: of the force, or of the answers of what no hand feels.
     choice : Choice, optional
         Values of fields that go out; by default mean, largest and least value of each.
     carried : CarriedMass, optional
@@ -171,7 +172,7 @@ def export_fmu(
     if surrogate.can_be_touched:
         block, described = _body(surrogate, name, deviation, choice, carried)
     else:
-        block, described = _answers(surrogate, name, choice, carried)
+        block, described = _answers(surrogate, name, deviation, choice, carried)
     card = card_of(surrogate).with_hash(block.label, block.hash)
     if carried is not None:
         card = replace(card, limits=(*card.limits, carried.sentence))
@@ -210,7 +211,7 @@ def _body(
 
 
 def _answers(
-    surrogate: Surrogate, name: str, choice: Choice | None, carried: CarriedMass | None
+    surrogate: Surrogate, name: str, deviation: bool, choice: Choice | None, carried: CarriedMass | None
 ) -> tuple[WeightsBlock, Described]:
     """Return weights and description of a surrogate that no hand feels."""
     if carried is not None:
@@ -220,6 +221,7 @@ def _answers(
             fix="Leave --mass and --damping out.",
         )
     answers = answer_network(surrogate, choice or Choice())
+    answers = answers if deviation else answers.without_doubts()
     words = str(surrogate).splitlines()[0]
     return WeightsBlock.of_answers(answers), Described(name, words, answer_variables(answers))
 

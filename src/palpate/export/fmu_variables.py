@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ANSWER",
+    "ANSWER_DEVIATION",
     "Variable",
     "answer_variables",
     "body_variables",
@@ -29,7 +30,7 @@ __all__ = [
 
 PARAMETER, STATE, FLAGS, SCALE = 16, 64, 12, 9  # value references, as in core/fmi_instance.c
 DAMPING, MASS, LIGHT = 48, 49, 0.05  # the last is the start of MASS, kg: a light tool
-PUSH, SPEED, KINETIC, ANSWER = 50, 53, 56, 1024
+PUSH, SPEED, KINETIC, ANSWER, ANSWER_DEVIATION = 50, 53, 56, 1024, 1 << 25
 _MOST_STATES = 2000  # solvers keep a square matrix of them, and each is described by two variables
 _PLACES = (0, 1, 2)
 _UNITS: Mapping[str, str] = {
@@ -122,6 +123,13 @@ def answer_variables(answers: AnswerNetwork) -> list[Variable]:
         _output(name, q.name, ANSWER + i, q.unit or "1", every)
         for name, i, q in zip(names[len(every) :], places, answers.outputs, strict=True)
     ]
+    if answers.rows is not None:
+        own = names[len(every) :]
+        spread = _different([*names, *(f"{name}_deviation" for name in own)])[len(names) :]
+        rows += [
+            _output(name, f"standard deviation of {q.name}", ANSWER_DEVIATION + i, q.unit or "1", every)
+            for name, i, q in zip(spread, places, answers.outputs, strict=True)
+        ]
     return [
         *rows,
         Variable("inside", "inside of the trained region", FLAGS, "output", "discrete", depends=every),

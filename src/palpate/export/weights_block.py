@@ -31,17 +31,21 @@ from palpate.surrogates import LearntEnergy, Surrogate, TouchedSurface
 from palpate.units import bounds
 
 if TYPE_CHECKING:
+    from palpate.export.answer_doubt import Doubt
     from palpate.export.answer_network import AnswerNetwork
 
 __all__ = [
     "ANSWER_NETS",
     "ARRAYS",
     "BASELINE",
+    "DOUBTS",
+    "DOUBT_ARRAYS",
     "FIELD",
     "FIELD_NET",
     "LANES",
     "MOTION",
     "NET",
+    "PLACES",
     "ROOT",
     "VERSION",
     "Table",
@@ -67,6 +71,7 @@ HEAD, NUMBERS, LIMITS, POINTS, AXES, NET, ROOT, BASELINE, MEMORY, FIELD, FIELD_N
     44,
 )
 ANSWER_NETS, RUNS, MOTION = (NET, BASELINE, BASELINE + 5), 22, 60  # see core/answers.c, core/fmi_motion.c
+PLACES, DOUBTS, DOUBT_ARRAYS = 23, 36, 6  # see core/answers.c
 ROOM = 12  # arrays that a baseline may have, and a memory
 ENDLESS = 1e30  # number that stands for infinity
 FAR = 1e15  # coordinate of points that fill up a row
@@ -236,6 +241,10 @@ class WeightsBlock:
             tables[MEMORY + i] = Table.of(_points(region))
         tables |= {HEAD: Table.of(np.array(sizes)), LIMITS: Table.of(np.array([low, high, high - low]))}
         tables[NUMBERS] = Table.of(radii)
+        if answers.rows is not None:
+            tables[PLACES] = Table.of(answers.rows)
+        for i, doubt in enumerate(answers.doubts):
+            tables |= _doubt_tables(doubt, DOUBTS + DOUBT_ARRAYS * i)
         if answers.runs:
             runs = [[run.first, run.count, int(run.largest)] for run in answers.runs]
             tables[RUNS] = Table.of(np.array(runs))
@@ -332,6 +341,21 @@ def _with_tiles(arrays: list[Table], surface: TouchedSurface) -> list[Table]:
         if all(np.array_equal(a.values, b.values) for a, b in zip(some, dense, strict=True)):
             return [*arrays[:first], *surface_tables(surface), *arrays[first + 3 :]]
     return arrays
+
+
+def _doubt_tables(doubt: Doubt, first: int) -> dict[int, Table]:
+    """Return the six arrays of how sure a part of the answers is."""
+    own = net_tables(doubt.network, 0, 0)
+    sizes = [doubt.plus, doubt.minus, doubt.samples, doubt.members, len(doubt.variance)]
+    numbers = np.concatenate([doubt.variance, doubt.missed.ravel(), doubt.floor])
+    return {
+        first: Table.of(np.concatenate([own[0].values.ravel(), sizes])),
+        first + 1: own[2],
+        first + 2: own[3],
+        first + 3: own[4],
+        first + 4: Table.of(numbers),
+        first + 5: Table.of(doubt.squares),
+    }
 
 
 def _numbered(first: int, arrays: list[Table], what: str) -> dict[int, Table]:

@@ -53,24 +53,11 @@ def choose_answers(
     interest: np.ndarray | None = None,
     candidates: np.ndarray,
 ) -> np.ndarray:
-    """Return the inputs (number, n) of the next solves, the best first.
+    """Return the inputs (number, n) of the next solves, the best first, among `candidates` (C, n).
 
-    Parameters
-    ----------
-    parts : sequence of (N, m)
-        Answers of the solves; each part counts by its own spread.
-    X : (N, n)
-        Inputs of the solves, SI units.
-    inputs : n ranges
-        Of the columns of X.
-    number : int
-        How many.
-    failed : (F, n)
-        Inputs whose solves failed: nothing is chosen beside them.
-    interest : (C,), optional
-        How much an error counts at each candidate; by default all the same.
-    candidates : (C, n)
-        Places to choose from.
+    `parts`, each (N, m), are the answers of the solves at X (N, n); each counts by its own spread. Nothing is chosen
+    beside the inputs `failed` (F, n), whose solves failed. `interest` (C,) is how much an error counts at each
+    candidate, by default all the same.
     """
     process = process_of(X, parts, inputs)
     places, solved = process.scale(candidates), process.scale(np.vstack([X, failed]))

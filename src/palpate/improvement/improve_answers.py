@@ -27,7 +27,7 @@ from palpate.learning.dataset_answers import DatasetAnswers
 from palpate.options import ImprovementOptions
 from palpate.surrogates import Surrogate
 from palpate.sweeps import Space, random, sobol
-from palpate.validation import validate
+from palpate.validation.validate import validate
 
 __all__ = ["AnswerImprovement", "unseen_places"]
 
@@ -120,14 +120,15 @@ class AnswerImprovement:
         assert self.kept.good is not None
         assert self.kept.data is not None
         answers = DatasetAnswers.of(self.kept.good)
-        parts = [one.values for one in answers.numbers.values()]
-        parts += [one.values.reshape(len(answers.X), -1) for one in answers.fields.values()]
         places = sobol(space, CANDIDATES, self.options.seed + 7919 * (1 + solved))
         failed = self.kept.X[~self.kept.data.converged]
         weights = None if self.interest is None else self.interest(places)
         with threadpool_limits(1):
             return choose_answers(
-                *(parts, answers.X, answers.inputs, size), failed=failed, interest=weights, candidates=places
+                *(answers.tables(), answers.X, answers.inputs, size),
+                failed=failed,
+                interest=weights,
+                candidates=places,
             )
 
     def _learn(self) -> tuple[Surrogate, Any]:
@@ -156,6 +157,18 @@ class AnswerImprovement:
     def _step(self, phase: str, *, is_new: bool = False) -> ImprovementStep:
         train, test = self.kept.good, self.judging.good
         surrogate, history = self.best or (None, None)
-        sizes = 0 if train is None else len(train), 0 if test is None else len(test)
-        figures = self.error, self.median, np.empty((0, 3)), np.empty(0), time.monotonic() - self.began
-        return ImprovementStep(phase, *sizes, *figures, surrogate, train, test, history, is_new)
+        return ImprovementStep(
+            phase,
+            solves=0 if train is None else len(train),
+            unseen=0 if test is None else len(test),
+            error=self.error,
+            median=self.median,
+            places=np.empty((0, 3)),
+            values=np.empty(0),
+            seconds=time.monotonic() - self.began,
+            surrogate=surrogate,
+            train=train,
+            test=test,
+            history=history,
+            is_new=is_new,
+        )

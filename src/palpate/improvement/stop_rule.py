@@ -70,6 +70,6 @@ class StopRule(StopOptions):
 
 @dataclass(frozen=True)
 class AnswerStopRule(StopRule):
-    """The same rule for numbers, fields and curves."""
+    """The rule that ends an improvement of numbers, fields and curves."""
 
     what: ClassVar[str] = "error"

@@ -52,6 +52,14 @@ class DatasetAnswers:
     fields: Mapping[str, FieldAnswers]
     notes: tuple[str, ...]  # what was left out, and why
 
+    def tables(self) -> list[np.ndarray]:
+        """Return the values of every number, field and curve, each (N, m)."""
+        every = [
+            *(one.values for one in self.numbers.values()),
+            *(one.values for one in self.fields.values()),
+        ]
+        return [values.reshape(len(self.X), -1) for values in every]
+
     @classmethod
     def of(cls, data: Dataset, *, to_learn: bool = True) -> DatasetAnswers:
         """Return the answers of a dataset; those to judge by need not vary.

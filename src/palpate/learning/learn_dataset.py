@@ -254,11 +254,8 @@ def _learn_answers(
     answers = DatasetAnswers.of(train)
     numbers: dict[str, Fitted] = {}
     fields: dict[str, LearntModes] = {}
-    every = [*(one.values for one in answers.numbers.values()), *(f.values for f in answers.fields.values())]
-    with threadpool_limits(
-        1
-    ):  # one choice for all parts: they leave together, as networks of the same inputs
-        bends = choose_bends(answers.X, [v.reshape(len(v), -1) for v in every], answers.inputs)
+    with threadpool_limits(1):  # one choice: the parts leave together, as networks of the same inputs
+        bends = choose_bends(answers.X, answers.tables(), answers.inputs)
     for group, part in answers.numbers.items():
         log(group)
         search = _fit_options(options, budget, len(answers.numbers) + len(answers.fields) - len(numbers))

@@ -225,7 +225,7 @@ def _network_from_json(
         shifts=plain["shifts"],
         weights=plain["weights"],
         tail=plain["tail"],
-        scaling=Scaling(*(plain[k] for k in _SCALES), plain.get(_BEND)),  # type: ignore[arg-type]
+        scaling=Scaling(**{k: plain[k] for k in _SCALES}, input_bend=plain.get(_BEND, np.zeros(0))),
         meta=description["meta"],
         radial=description["radial"],
         basis=plain.get("basis"),

@@ -59,10 +59,10 @@ class Scaling:
     input_half: np.ndarray
     output_centre: np.ndarray
     output_scale: np.ndarray
-    input_bend: np.ndarray = None  # type: ignore[assignment]  # zeros, see __post_init__
+    input_bend: np.ndarray = field(default_factory=lambda: np.zeros(0))  # zeros: see __post_init__
 
     def __post_init__(self) -> None:
-        if self.input_bend is None:
+        if not self.input_bend.size:
             object.__setattr__(self, "input_bend", np.zeros(np.shape(self.input_half)))
 
     @classmethod

@@ -77,11 +77,11 @@ def export_html(
     require_outputs([path], endings=(".html", ".htm"), overwrite=overwrite)
     if not surrogate.can_be_touched:
         answers = AnswerPage.of(surrogate, Path(path).stem.removesuffix("-page"))
-        told = compare_page(surrogate, answers.parts) if check else None
-        if told is not None:
-            told.require(f"The page of {surrogate.name} does", why="", fix=_REPORT)
+        comparison = compare_page(surrogate, answers.parts) if check else None
+        if comparison is not None:
+            comparison.require(f"The page of {surrogate.name} does", why="", fix=_REPORT)
         file = write_file(Path(path), with_seal(path, answers.document()))
-        return ExportedPage(file, answers.hash, told, answers.left_out)
+        return ExportedPage(file, answers.hash, comparison, answers.left_out)
     page = _Page.of(surrogate)
     comparison = page.compare() if check and wasmtime_module() is not None else None
     if comparison is not None:

@@ -27,6 +27,47 @@ PP_PART int pp_answer_net_fits(const pp_array *net, int32_t n, int32_t outputs) 
   return 1;
 }
 
+/* whether a doubt has all that its numbers say */
+PP_PART int pp_doubt_fits(const pp_array *a, const pp_array *doubt, int32_t n) {
+  const int32_t *head = doubt[0].whole;
+  pp_array net[PP_NET_ARRAYS];
+  int64_t latent, rows = doubt[5].n[0];
+  int32_t i;
+  if (!pp_is(&doubt[0], PP_DOUBT_SIZES, 1, 0)) return 0;
+  for (i = PP_PLUS; i < PP_DOUBT_SIZES; i++) {
+    if (head[i] < (i == PP_OWN ? 1 : 0) || head[i] > (1 << 16)) return 0;
+  }
+  latent = (int64_t)head[PP_PLUS] + head[PP_MINUS] + head[PP_SAMPLES] + (int64_t)head[PP_MEMBERS] * head[PP_OWN];
+  net[PP_SIZES] = doubt[0];
+  net[PP_SIZES].n[0] = 7;
+  net[PP_SCALES] = a[PP_NET + PP_SCALES];
+  for (i = 1; i < 4; i++) net[PP_SCALES + i] = doubt[i];
+  if (latent > head[4] || !pp_answer_net_fits(net, n, head[4])) return 0;
+  if (!pp_dense(&doubt[4]) || doubt[4].n[1] != 1) return 0;
+  if (doubt[4].n[0] != head[PP_OWN] + (int64_t)head[PP_OWN] * head[PP_SAMPLES] + rows) return 0;
+  return rows > 0 && pp_is(&doubt[5], (int32_t)rows, head[PP_OWN], 1);
+}
+
+/* whether each output has a row of a doubt, where there are doubts */
+PP_PART int pp_doubts_fit(const pp_array *a, int32_t n, int32_t m) {
+  const pp_array *places = &a[PP_PLACES];
+  int32_t i, any = 0;
+  for (i = 0; i < PP_MOST_DOUBTS; i++) {
+    const pp_array *doubt = &a[PP_DOUBTS + PP_DOUBT_ARRAYS * i];
+    if (doubt->n[0] == 0) continue;
+    any = 1;
+    if (!pp_doubt_fits(a, doubt, n)) return 0;
+  }
+  if (!any) return places->n[0] == 0;
+  if (!pp_is(places, m, 2, 0)) return 0;
+  for (i = 0; i < m; i++) {
+    const int32_t d = places->whole[2 * i], row = places->whole[2 * i + 1];
+    if (d < 0 || d >= PP_MOST_DOUBTS || a[PP_DOUBTS + PP_DOUBT_ARRAYS * d].n[0] == 0) return 0;
+    if (row < 0 || row >= a[PP_DOUBTS + PP_DOUBT_ARRAYS * d + 5].n[0]) return 0;
+  }
+  return 1;
+}
+
 /* whether arrays that pp_open has found, and `pp_is_answers` says are of this kind, fit each other */
 PP_PART int pp_answers_fit(const pp_array *a) {
   const int32_t n = a[PP_HEAD].whole[PP_INPUTS], m = a[PP_HEAD].whole[PP_OUTPUTS];
@@ -41,6 +82,7 @@ PP_PART int pp_answers_fit(const pp_array *a) {
     const pp_array *points = &a[PP_REGIONS + i];
     if (points->n[0] > 0 && (!pp_is(points, n, points->n[1], 1) || points->n[1] % PP_LANES)) return 0;
   }
+  if (!pp_doubts_fit(a, n, m)) return 0;
   if (runs->n[0] == 0) return 1;
   if (!pp_is(runs, runs->n[0], 3, 0)) return 0;
   for (i = 0; i < runs->n[0]; i++) {

@@ -49,8 +49,9 @@ static void check_step(Instance *c, double dt) {
 static void renew_answers(Instance *c) {
   const int32_t count = pp_answer_count(&c->model);
   int32_t i;
-  pp_answers(&c->model, c->now.p, c->answers + count, c->answers);
-  c->flags = pp_answers_inside(&c->model, c->now.p) ? PP_TRUSTED : 0;
+  pp_answers(&c->model, c->now.p, c->answers + 2 * count, c->answers);
+  c->flags = pp_answers_inside(&c->model, c->now.p, c->answers + 2 * count) ? PP_TRUSTED : 0;
+  c->deviated = 0;
   for (i = 0; i < count; i++) {
     if (!pp_finite(c->answers[i])) c->flags = PP_NOT_A_NUMBER;
   }
@@ -167,6 +168,21 @@ static int32_t answer_of(const Instance *c, uint32_t v) {
   return c->untouched && v >= ANSWER && (int64_t)v - ANSWER < pp_answer_count(&c->model) ? (int32_t)(v - ANSWER) : -1;
 }
 
+/* the answer whose standard deviation a value reference is, or -1 */
+static int32_t deviation_of(const Instance *c, uint32_t v) {
+  if (!c->untouched || c->arrays[PP_PLACES].n[0] == 0) return -1;
+  return v >= ANSWER_DEVIATION && (int64_t)v - ANSWER_DEVIATION < pp_answer_count(&c->model) ? (int32_t)(v - ANSWER_DEVIATION) : -1;
+}
+
+/* the standard deviation of an answer that no hand feels */
+static double answer_deviation(Instance *c, int32_t i) {
+  const int32_t count = pp_answer_count(&c->model);
+  renew(c);
+  if (!c->deviated) pp_answers_deviation(&c->model, c->now.p, c->answers, c->answers + 2 * count, c->answers + count);
+  c->deviated = 1;
+  return c->answers[count + i];
+}
+
 static double state_value(const Instance *c, int32_t i) {
   return c->moves ? c->now.motion[i] : pp_state(&c->model, c->numbers, i);
 }
@@ -185,6 +201,7 @@ static int value_of(Instance *c, uint32_t v, double *value) {
   if (c->untouched) {
     if (v == TIME) *value = c->now.time;
     else if (is_parameter(c, v)) *value = c->now.p[v - PARAMETER];
+    else if (deviation_of(c, v) >= 0) *value = answer_deviation(c, deviation_of(c, v));
     else if (answer_of(c, v) < 0) return 0;
     else {
       renew(c);

@@ -31,7 +31,8 @@ enum { INSTANTIATED = 1, INITIALIZING = 2, EVENT = 4, CONTINUOUS = 8, STEPPING =
  * rates after those; what no hand feels has its inputs from PARAMETER on and its answers from ANSWER on */
 enum {
   FX = 3, FY = 4, FZ = 5, ENERGY = 6, DEPTH = 7, DEVIATION = 8, SCALE = 9, STORED = 10, LOST = 11, TIME = 15, PARAMETER = 16,
-  DAMPING = 48, MASS = 49, PUSH = 50, SPEED = 53, KINETIC = 56, STATE = 64, ANSWER = 1024
+  DAMPING = 48, MASS = 49, PUSH = 50, SPEED = 53, KINETIC = 56, STATE = 64, ANSWER = 1024,
+  ANSWER_DEVIATION = 1 << 25
 };
 
 /* everything that changes while an instance lives; the memory's numbers follow it */
@@ -50,7 +51,7 @@ struct Instance {
   pp_model model;
   unsigned char *bytes;
   /* of the deviation; what the memory keeps now, before the last step, on trial, and meanwhile; rates */
-  double *work, *numbers, *before, *trial, *kept, *rates, *answers; /* answers: those that no hand feels, then latent ones */
+  double *work, *numbers, *before, *trial, *kept, *rates, *answers; /* answers: those that no hand feels, their deviations, latent ones */
   Moment now, start;
   int32_t parameters, size, states;
   int exchange, known, flags, deviated, rated, probing, damped, moves, untouched; /* untouched: no hand feels it */
@@ -239,7 +240,7 @@ static Instance *fill(Instance *c, const char *name, const char *hash, const cha
   c->numbers = (double *)calloc(4 * (size_t)c->size + 1, sizeof(double));
   c->rates = (double *)calloc((size_t)c->states + 1, sizeof(double));
   if (c->untouched) {
-    c->answers = (double *)calloc((size_t)pp_answer_count(&c->model) + (size_t)pp_latent_count(&c->model), sizeof(double));
+    c->answers = (double *)calloc(2 * (size_t)pp_answer_count(&c->model) + (size_t)pp_latent_count(&c->model), sizeof(double));
     if (!c->answers) return fail(c, "%s", "There is no memory for an instance.");
   }
   if (!c->work || !c->numbers || !c->rates) return fail(c, "%s", "There is no memory for an instance.");

@@ -54,7 +54,7 @@ class AnswerProcess:
 
     def scale(self, X: np.ndarray) -> np.ndarray:
         """Return scaled inputs of X (M, n)."""
-        return self.scaling.scale_inputs(X)
+        return np.asarray(self.scaling.scale_inputs(X))
 
     def covariance_after(self, places: np.ndarray, solved: np.ndarray) -> np.ndarray:
         """Return the covariance (C, C) at scaled places (C, n), after answers at scaled inputs `solved` (S, n)."""
@@ -76,7 +76,7 @@ class AnswerProcess:
 
 
 def _plane(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    return _PLANE * (1.0 + A @ B.T)
+    return np.asarray(_PLANE * (1.0 + A @ B.T))
 
 
 def joined_answers(parts: Sequence[np.ndarray], rows: np.ndarray) -> np.ndarray:

@@ -40,7 +40,7 @@ FEW = 100
 
 _CLOSE = 2.0  # rows for each place, from which there are close rows in many places
 # noise over signal; of clean rows as little as lets an exported network answer as this one to 1e-9
-_RIDGES = (np.log(1e-11), np.log(1e2))
+_RIDGES = (np.log(1e-10), np.log(1e2))
 _SLOPES = (np.log(1e-4), np.log(1e4))
 _STARTS = ((0.0, 1e-5), (0.0, 0.1), (-1.2, 1e-5))  # scales' logarithms beside 1/√n, and ridges
 _CLIMB, _ON = 80, 15  # iterations of a likelihood, and without a fold from the metric of all

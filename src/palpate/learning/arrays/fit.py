@@ -54,8 +54,7 @@ __all__ = ["fit"]
 _error = attrgetter("error")  # of a candidate, on held-out samples
 _WORK = 5e11  # multiplications at effort 1: half a minute at most
 _PLANNED_SECONDS = 30.0  # of that work: a shorter limit on time plans for less
-# unknowns in the units of a candidate at effort 1, and at a first look
-_FULL_NUMBERS, _LOOK_NUMBERS = 1500, 600
+_FULL_NUMBERS, _LOOK_NUMBERS = 1500, 600  # unknowns in units of a candidate at effort 1, and at a first look
 _METRIC_SAMPLES = 500  # of which a likelihood is computed; its work goes with their cube
 _CROSSED_FOLDS, _CROSSED_ROUNDS = 5, 2  # of the networks learnt crosswise: ten in all
 _QUICK = 0.03  # effort below which one round of folds judges one kind: a first answer in about a second
@@ -95,10 +94,9 @@ def fit(
     outputs : sequence of m quantities, optional
         Named y0, y1, … if left out.
     lines : sequence of N int, optional
-        Line of each sample in the file that it comes from; notes name a sample by it. By default they name its row
-        in X, counted from 0.
+        Line of each sample in its file, by which notes name it; by default its row in X, counted from 0.
     bends : (n,), optional
-        Bends of the inputs' scales, see `palpate.network.Scaling`; all are straight by default.
+        Of the inputs' scales, see `palpate.network.Scaling`; none by default.
 
     Returns
     -------
@@ -119,8 +117,7 @@ def fit(
     Raises
     ------
     UsageError
-        If there are too few samples, shapes disagree, numbers are not finite or all outputs the same, or an option
-        can't be.
+        If samples are too few, shapes disagree, numbers are not finite, outputs the same, or an option can't be.
     """
     from threadpoolctl import threadpool_limits
 

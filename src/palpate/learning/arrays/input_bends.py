@@ -37,16 +37,9 @@ def inverse_bend(low: float, high: float) -> float:
 
 
 def choose_bends(X: np.ndarray, parts: Sequence[np.ndarray], inputs: Sequence[Range]) -> np.ndarray:
-    """Return the bends (n,) of inputs, zero for those that stay straight.
+    """Return the bends (n,) of inputs, zero for those that stay straight, by samples at X (N, n), in SI units.
 
-    Parameters
-    ----------
-    X : (N, n)
-        Inputs of the samples, SI units.
-    parts : sequence of (N, m)
-        What is to be learnt of them; each part counts by its errors over its own spread.
-    inputs : n ranges
-        Of the columns of X.
+    `parts`, each (N, m), are what is to be learnt; each counts by its errors over its own spread.
     """
     bends, ends = np.zeros(len(inputs)), np.abs(np.array(bounds(inputs)))
     ratio = ends.max(axis=0) / np.maximum(ends.min(axis=0), 1e-300)

@@ -1,6 +1,6 @@
 """The mesh's stated part in the force error, beside what other touches show on a mesh twice as fine.
 
-    python -m benchmarks.mesh_parts block breast-dome kidney     or any other named study; 1 to 10 minutes each
+    python -m benchmarks.mesh_parts block-quick kidney-rough     or any other named study or sample part
 
 As `palpate sweep` does, three unseen touches of a study are solved on its elements and on those half as large around
 them, and the mesh's part is stated from them. The rival is what the statement speaks of: the 95th percentile of other
@@ -21,6 +21,7 @@ from palpate.physics.solid.finer_problem import finer_problem
 from palpate.study.mesh_check import LIGHT
 from palpate.study.named_studies import preset_names, preset_study
 from palpate.study.part_study import part_study
+from palpate.study.part_work import rough_study
 from palpate.study.stage_records import ProbeTestRecord
 from palpate.study.study import Study
 from palpate.validation.figures.mesh_error import WHOLE, part_of_mesh
@@ -63,16 +64,19 @@ def _forces(problem: Any, places: np.ndarray) -> np.ndarray:
 
 
 def _study(name: str) -> Study:
-    """A named study, or that of a sample part."""
+    """A named study, that of a sample part, or with "-rough" the one of its first touch."""
     if name.removesuffix("-quick") in preset_names():
         return preset_study(name.removesuffix("-quick"), quick=name.endswith("-quick"))
     folder = Path(tempfile.mkdtemp())
-    return part_study(write_sample_part(folder / f"{name}.stl", name))[0]
+    part = name.removesuffix("-rough")
+    study = part_study(write_sample_part(folder / f"{part}.stl", part))[0]
+    rough = rough_study(study) if name.endswith("-rough") else None
+    return rough or study
 
 
 def main() -> None:
     """Print both parts of each study that is named."""
-    for name in sys.argv[1:] or ("block", "breast-dome", "kidney"):
+    for name in sys.argv[1:] or ("block-quick", "kidney-rough", "liver-rough"):
         stated, shown = mesh_parts(_study(name))
         print(f"{name}: stated {stated:.1%}, shown {shown:.1%}, ratio {stated / shown:.2f}", flush=True)
 

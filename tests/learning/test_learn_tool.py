@@ -10,6 +10,7 @@ import pressed
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.export import export_c
+from palpate.export.onnx_export import export_onnx
 from palpate.learning.pressed_solves import PressedSolves
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.baselines import deepest_ball
@@ -71,10 +72,11 @@ def test_a_hand_feels_it_at_the_foremost_point(ball):
 
 @pytest.mark.full
 def test_what_does_not_know_tools_refuses_them(ball, tmp_path):
-    with pytest.raises(UsageError, match="no page draws"):
+    with pytest.raises(UsageError, match="be drawn on a page yet"):
         PageModel(touchable(ball))
-    with pytest.raises(UsageError, match="can't be exported yet"):
-        export_c(ball, tmp_path)
+    for export in (export_c, export_onnx):
+        with pytest.raises(UsageError, match="can't be exported yet"):
+            export(ball, tmp_path / "ball.onnx")
     with pytest.raises(UsageError, match="tool"):
         pp.validate(ball, pressed.dataset(pressed.solves()))
 

@@ -20,7 +20,13 @@ from palpate.errors import UsageError
 from palpate.export.onnx_graph import Graph, Value
 from palpate.export.onnx_network import Slopes, network_slopes, regressors
 from palpate.export.onnx_surface import Distance, distance_to
-from palpate.surrogates.baselines import ConstantBaseline, ContactBaseline, OverlapBaseline, PadBaseline
+from palpate.surrogates.baselines import (
+    ConstantBaseline,
+    ContactBaseline,
+    OverlapBaseline,
+    PadBaseline,
+    require_ball,
+)
 from palpate.surrogates.baselines.overlap_baseline import LARGEST, SMALLEST
 from palpate.surrogates.energy import LearntEnergy
 
@@ -63,6 +69,7 @@ def add_body(graph: Graph, energy: LearntEnergy, *, apart: bool = False) -> None
     each speaks for itself, so that it can be computed without the others.
     """
     baseline, net = energy.baseline, energy.network
+    require_ball(baseline, "be exported")
     n, D = len(energy.inputs), energy.baseline.directions
     k = len(D)
     given = graph.input("x", n)

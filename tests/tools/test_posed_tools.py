@@ -155,6 +155,10 @@ def test_a_rigid_tool_gets_its_pad_from_the_body():
         (lambda: SurfaceTool("capsule"), "one of palpate.tools"),
         (lambda: SurfaceTool(tools.Punch(0.006, 1e-4)), "0.00037|element=0.0002"),
         (lambda: SurfaceTool(tools.Punch(0.006, 1e-3), element=0.003), "edge of at least 0.0015"),
+        (
+            lambda: BODY.problem(SurfaceTool(tools.Punch(0.006, 1e-3)), element=0.003),
+            "edge of at least 0.0015",
+        ),
         (lambda: SurfaceTool(tools.Sphere(0.006), rotation=(0.1, 0.2)), "rotation"),
         (lambda: SurfaceTool(tools.Sphere(0.006), pad="soft"), "pad"),
         (

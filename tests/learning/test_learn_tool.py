@@ -27,7 +27,7 @@ def under(tool: PosedTool, touches: str = "top", count: int = 60) -> Dataset:
     """Solves of the closed form, told of as those under a tool a radius before the ball's centre."""
     acting = {"type": "SurfaceTool", "touches": touches, "depth": (0.0, DEEPEST), **tool.describe()}
     inputs = tuple(
-        pp.Range(f"p{r.name[1:]}", r.low - w, r.high - w, "m")
+        pp.Range(f"tip{r.name[1:]}", r.low - w, r.high - w, "m")
         for r, w in zip(pressed.INPUTS, WAY.tolist(), strict=True)
     )
     X = pressed.places(count)

@@ -126,7 +126,7 @@ def test_places_touch_the_surface_at_the_least_depth_and_fit_into_their_ranges()
     low, high = np.array([(r.low, r.high) for r in problem.ranges]).T
     assert (places >= low - 1e-12).all()
     assert (places <= high + 1e-12).all()
-    assert [r.name for r in problem.ranges] == ["p_x", "p_y", "p_z"]
+    assert [r.name for r in problem.ranges] == ["tip_x", "tip_y", "tip_z"]
 
 
 def test_its_hash_follows_from_its_shape_and_pose():

@@ -1,7 +1,9 @@
 """A ball pressed into a block by a plain NGSolve script that shares no code with palpate: data of a foreign solver.
 
-    python -m benchmarks.foreign_block            learns from each ten, judges by sixty and prints the force errors
-    python -m benchmarks.foreign_block --solve    solves again and writes benchmarks/data/foreign_block.npz, 10 minutes
+    python -m benchmarks.foreign_block                learns from each ten, judges by sixty, prints the force errors
+    python -m benchmarks.foreign_block --effort 4     with another effort of learning than 1
+    python -m benchmarks.foreign_block --element 5    solves them all first with elements of 5 mm in place of 2.5 mm
+    python -m benchmarks.foreign_block --solve        solves and writes benchmarks/data/foreign_block.npz, 10 minutes
 
 A block of 60 × 60 × 30 mm of neo-Hookean tissue, 9 kPa, held at its bottom; a ball of radius 10 mm whose pad of
 2 MPa/m gives way. Forty presses to learn from, in four tens that each spread over the whole range, and sixty to judge
@@ -10,8 +12,8 @@ by, all on an eighth of the top's middle: the block has eight mirror images. `pa
 
 from __future__ import annotations
 
+import argparse
 import itertools
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ PAD = 2e6  # Pa/m
 REACH = 0.010  # m, of the ball's centre from the middle of the top
 DEPTHS = (5e-4, 6e-3)  # m
 STEP = 2e-3  # m, of a load step
+ELEMENT, COARSE = 2.5e-3, 8e-3  # m, where it is pressed and elsewhere
 TENS, TEN, JUDGED = 4, 10, 60
 FILE = Path(__file__).parent / "data" / "foreign_block.npz"
 
@@ -43,18 +46,17 @@ def places() -> np.ndarray:
     return np.concatenate(parts)
 
 
-def mesh() -> Any:
-    """Return a mesh that is fine where the eighth is pressed."""
+def mesh(element: float) -> Any:
+    """Return a mesh with elements of this size in m where the eighth is pressed."""
     import ngsolve
     from netgen.meshing import MeshingParameters
     from netgen.occ import Box, OCCGeometry, Pnt
 
     box = Box(Pnt(0, 0, 0), Pnt(SIDE, SIDE, HEIGHT))
     box.faces.Min(_axis()).name, box.faces.Max(_axis()).name = "bottom", "top"
-    settings = MeshingParameters(maxh=0.008, grading=0.3)
-    for x in np.arange(0.024, 0.0461, 0.0025):
-        for y in np.arange(0.024, 0.0461, 0.0025):
-            settings.RestrictH(x=x, y=y, z=HEIGHT, h=0.0025)
+    settings = MeshingParameters(maxh=COARSE, grading=0.3)
+    for x, y in itertools.product(np.arange(0.024, 0.0461, element), repeat=2):
+        settings.RestrictH(x=x, y=y, z=HEIGHT, h=element)
     return ngsolve.Mesh(OCCGeometry(box).GenerateMesh(settings))
 
 
@@ -64,12 +66,12 @@ def _axis() -> Any:
     return Z
 
 
-def solve(centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the energies (N,) in J and the forces (N, 3) in N on the ball at its centres (N, 3) in m."""
+def solve(centres: np.ndarray, element: float = ELEMENT) -> dict[str, np.ndarray]:
+    """Return centres (N, 3) of the ball in m, energies (N,) in J and forces (N, 3) on it in N, by their names."""
     import ngsolve as ng
 
     ng.SetNumThreads(1)
-    body = mesh()
+    body = mesh(element)
     space = ng.VectorH1(body, order=2, dirichlet="bottom")
     u, shear = space.TrialFunction(), YOUNG / 2 / (1 + POISSON)
     bulk = YOUNG * POISSON / (1 + POISSON) / (1 - 2 * POISSON)
@@ -105,17 +107,16 @@ def solve(centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         touch.Apply(state.vec, residual)
         forces[row] = [ng.InnerProduct(residual, v) for v in rigid]
         print(row, centre, energies[row], forces[row], flush=True)
-    return energies, forces
+    return {"centre": centres, "energy": energies, "force": forces}
 
 
-def force_errors(ten: int) -> np.ndarray:
-    """Return the relative force errors (60,) of a surrogate learnt from one of the four tens."""
+def force_errors(data: dict[str, np.ndarray], ten: int, effort: float = 1.0) -> np.ndarray:
+    """Return the relative force errors (60,) of a surrogate learnt from one of the four tens of these touches."""
     from palpate.learning import learn_energy
     from palpate.surrogates import ContactBaseline, ContactLaw, Solves, TouchedSurface
     from palpate.units import Range
 
-    with np.load(FILE) as data:
-        centre, energy, force = (data[name] for name in ("centre", "energy", "force"))
+    centre, energy, force = (data[name] for name in ("centre", "energy", "force"))
     learnt, judged = slice(TEN * ten, TEN * (ten + 1)), slice(TENS * TEN, None)
     middle, far = SIDE / 2, 3 * SIDE
     corners = np.array([[-far, -far, HEIGHT], [far, -far, HEIGHT], [far, far, HEIGHT], [-far, far, HEIGHT]])
@@ -136,20 +137,30 @@ def force_errors(ten: int) -> np.ndarray:
         np.array(square),
         np.array([middle, middle, 0.0]),
     )
-    found = learn_energy(solves, ContactBaseline(ContactLaw("series", RADIUS / 10), surface, RADIUS))[0]
+    baseline = ContactBaseline(ContactLaw("series", RADIUS / 10), surface, RADIUS)
+    found = learn_energy(solves, baseline, effort=effort)[0]
     off = np.linalg.norm(found.force(centre[judged]) - force[judged], axis=1)
     return np.asarray(off / np.linalg.norm(force[judged], axis=1))
 
 
 def main() -> None:
-    """Solve where that is asked for, else judge each of the tens."""
-    if "--solve" in sys.argv:
-        centres = places()
-        energies, forces = solve(centres)
-        np.savez_compressed(FILE, centre=centres, energy=energies, force=forces)
-        return
+    """Solve where that is asked for, and judge each of the tens."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--solve", action="store_true", help="write the data anew")
+    parser.add_argument("--element", type=float, metavar="MM", help="solve with elements of this size")
+    parser.add_argument("--effort", type=float, default=1.0, help="of learning")
+    wanted = parser.parse_args()
+    if wanted.solve:
+        np.savez_compressed(FILE, **solve(places()))
+    if wanted.element:
+        data = solve(places(), wanted.element / 1e3)
+    else:
+        with np.load(FILE) as stored:
+            data = dict(stored)
     for ten in range(TENS):
-        errors = 100 * force_errors(ten)
+        errors = 100 * force_errors(data, ten, wanted.effort)
         print(
             f"ten {ten + 1}: median {np.median(errors):.2f} %, 95th percentile {np.quantile(errors, 0.95):.2f} %"
         )

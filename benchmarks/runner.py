@@ -21,6 +21,7 @@ __all__ = ["BENCHMARKS", "Benchmark", "main"]
 
 BENCHMARKS = (
     "active_choice",
+    "bracket",
     "cantilever",
     "cold_start",
     "device_round_trips",
@@ -29,8 +30,11 @@ BENCHMARKS = (
     "few_rows",
     "filters",
     "hand_drives",
+    "heated_plate",
     "latency",
     "literature",
+    "mujoco_flex",
+    "newton_balls",
     "online",
     "page_speed",
     "peers",
@@ -38,6 +42,7 @@ BENCHMARKS = (
     "refinement",
     "runtime",
     "scale",
+    "simulator_forces",
     "stability",
     "streams",
     "surrogates",

@@ -1,8 +1,8 @@
-"""Eleven parts made by scripts, as people have them: STL, STEP, volume meshes; smooth, noisy, grooved, thin.
+"""Ten parts made by scripts, as people have them: STL, STEP, volume meshes; smooth, noisy, grooved, thin.
 
 Each function writes one file and returns its path. None of them was made to suit palpate: each stands for a kind of
 part that people press (a lattice, a cup, a sponge, a limb, a scan, a bracket), with the triangles that its tool would
-give it.
+give it. A grooved organ and a dome come beside these ten, for `painted_parts`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import meshio
 import numpy as np
 
-__all__ = ["PARTS"]
+__all__ = ["PARTS", "dome", "grooved_organ"]
 
 
 def lattice_ring(folder: Path) -> Path:
@@ -135,24 +135,34 @@ def hollow_heart(folder: Path) -> Path:
 
 
 def grooved_organ(folder: Path) -> Path:
-    """Write an organ of 76 × 96 × 81 mm with five winding grooves of 4 mm width and 1.5 mm depth, noisy, as STL.
+    """Write an organ of 76 × 96 × 81 mm with winding grooves of 9 mm width and 2.5 mm depth on top, noisy, as STL.
 
-    The grooves are narrower than the contact of a ball of 8 mm, which is 7 mm wide at a depth of 0.8 mm, and deeper
-    than that; each corner has the noise of a scanner.
+    The grooves are narrower than the contact of a ball of 12 mm, which is 13 mm wide at a depth of 2 mm, and deeper
+    than that; each corner has the noise of a scanner. The triangles are of 3 mm.
     """
     from trimesh.creation import icosphere
 
-    sphere, rng = icosphere(subdivisions=5), np.random.default_rng(11)
+    sphere, rng = icosphere(subdivisions=4), np.random.default_rng(11)
     unit = np.array(sphere.vertices)
     x, y, z = unit.T
     lobes = 1 + 0.05 * np.sin(3 * x + 1) * np.cos(2 * y) + 0.03 * np.cos(4 * z + x)
     points = unit * (38, 48, 40.5) * lobes[:, None]
-    # height in the grooves' own wave: they lie 13 mm apart and wind by 6 mm
+    # height in the grooves' own wave: they lie 15 mm apart and wind by 6 mm
     phase = points[:, 1] + 6 * np.sin(points[:, 0] / 9) * np.cos(points[:, 2] / 14)
-    beside = np.abs((phase + 6.5) % 13 - 6.5)
-    depth = 1.5 * np.exp(-((beside / 1.4) ** 2)) * (np.abs(y) < 0.7)
-    moved = points - depth[:, None] * unit + 0.04 * rng.standard_normal(points.shape)
+    beside = np.abs((phase + 7.5) % 15 - 7.5)
+    # they end gently below the middle: a groove that broke off would be a sharp edge
+    rise = np.clip((z - 0.2) / 0.3, 0, 1)
+    depth = 2.5 * np.exp(-((beside / 3.15) ** 2)) * rise * rise * (3 - 2 * rise)
+    moved = points - depth[:, None] * unit + 0.06 * rng.standard_normal(points.shape)
     return _stl(moved, np.array(sphere.faces), folder / "grooved-organ.stl")
+
+
+def dome(folder: Path) -> Path:
+    """Write half a ball of 80 mm on its flat side as STL, as a breast phantom."""
+    from netgen.occ import Box, Pnt, Sphere
+
+    half = Sphere(Pnt(0, 0, 0), r=40) * Box(Pnt(-50, -50, 0), Pnt(50, 50, 50))
+    return _stl_of(half, folder / "dome.stl", 4)
 
 
 PARTS: dict[str, Callable[[Path], Path]] = {
@@ -168,7 +178,6 @@ PARTS: dict[str, Callable[[Path], Path]] = {
         layered_skin,
         bent_finger,
         hollow_heart,
-        grooved_organ,
     )
 }
 

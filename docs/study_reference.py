@@ -19,13 +19,15 @@ from palpate.study.body_records import (
     SectionRecord,
     SkinRecord,
 )
-from palpate.study.interaction_records import InteractionRecord, LoadRecord, MemoryRecord, VariedRecord
+from palpate.study.interaction_records import VariedRecord
+from palpate.study.loads_kind import LoadRecord
 from palpate.study.material_records import (
     FibreRecord,
     HardeningRecord,
     MaterialRecord,
     SolidMaterialRecord,
 )
+from palpate.study.memory_kind import MemoryRecord
 from palpate.study.part_records import PartSurfaceRecord
 from palpate.study.solver_study import (
     SolverInputRecord,
@@ -36,6 +38,7 @@ from palpate.study.solver_study import (
     UMBridgeRecord,
 )
 from palpate.study.stage_records import SECTIONS, RuntimeRecord
+from palpate.study.study import InteractionRecord
 
 PAGE = Path(__file__).parent / "guide" / "study-file.md"
 BEGIN, END = "<!-- generated: begin -->", "<!-- generated: end -->"
@@ -68,7 +71,9 @@ def _tables() -> Iterator[str]:
     yield from _table("`[[interaction.loads]]`, once per load", LoadRecord, _purpose(LoadRecord))
     yield from _table("`[memory]`, of a body that yields or creeps", MemoryRecord, _purpose(MemoryRecord))
     yield from _table("`[[varied]]`, once per number", VariedRecord, _purpose(VariedRecord))
-    for kind, sections in SECTIONS.items():
+    kinds = [acting.model_fields["kind"].default for acting in get_args(InteractionRecord)]
+    for kind in (*kinds, "memory"):
+        sections = SECTIONS[kind]
         where = "of a body with memory" if kind == "memory" else f"with the interaction `{kind}`"
         for name, record in sections.items():
             yield from _table(f"`[{name}]` {where}", record, _purpose(record))

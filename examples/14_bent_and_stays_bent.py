@@ -9,25 +9,24 @@ from dataclasses import replace
 import numpy as np
 
 import palpate as pp
-from palpate.learning.plastic import learn_with_memory, solve_elastic, solve_histories
+from palpate.dataset import histories_of
+from palpate.sweeps import solve_histories
 
 copper = pp.named_material("annealed copper")
 rod = pp.Cantilever(
     length=1.0, section=pp.Circle(radius=0.005), material=copper, elements=8, fibres=24, tolerance=1e-4
 )
-bent = rod.problem(pp.TipLoad(-25.0, 25.0))
-train = solve_histories(bent, low=-25.0, high=25.0, count=3, seed=1)
-test = solve_histories(bent, low=-25.0, high=25.0, count=2, seed=1001, outward=0.0)
-reach = max(abs(path.place).max() for path in (*train.paths, *test.paths))
 elastic = replace(rod, material=copper.elastic, fibres=None, tolerance=None)
-same = solve_elastic(elastic.problem(pp.TipLoad(0.0, 60.0)), reach=reach, load=30.0)
+bent = rod.problem(pp.TipLoad(-25.0, 25.0))
+train = solve_histories(bent, elastic=elastic.problem(pp.TipLoad(0.0, 60.0)), count=3, seed=1)
+test = histories_of(solve_histories(bent, count=2, seed=1001, outward=0.0))
 
-body, fit = learn_with_memory(train, same, name="copper rod")
+body, history = pp.learn(train, name="copper rod")
 print(body)
-print(fit)
+print(history.memory)
 
 miss, elastic_miss, down = [], [], body.energy.baseline.directions[0]
-for path in test.paths:
+for path in test:
     places = path.place[:, None]
     miss.append(-body.follow(places).force @ down - path.force)
     elastic_miss.append(-body.energy.force(places) @ down - path.force)

@@ -52,8 +52,8 @@ def test_an_option_beyond_its_bounds_is_refused_with_its_meaning(wrong):
 
 
 def test_keys_of_a_study_are_the_same_options():
-    from palpate.study.stage_records import PadLearningRecord
+    from palpate.study.stage_records import EnergyLearningRecord
 
     for name in ("effort", "seconds", "workers", "units_max", "target", "seed"):
-        key, declaration = PadLearningRecord.model_fields[name], declarations(EnergyOptions)[name]
+        key, declaration = EnergyLearningRecord.model_fields[name], declarations(EnergyOptions)[name]
         assert (key.default, key.description) == (declaration.default, declaration.text)

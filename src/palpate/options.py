@@ -3,7 +3,7 @@
 A record of options is a frozen dataclass whose fields are made by `option`. From that one declaration come
 
     Python         checks of the values, the text in `help`, and keywords of functions (`takes`)
-    study files    keys of a table (`palpate.study.stage_records`)
+    study files    keys of a table (`palpate.study.stage_records` and those of each kind)
     command line   options of a command (`palpate.cli.number_options`)
 
 Nothing heavy is imported here: the command line reads the declarations to print its help.

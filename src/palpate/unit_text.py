@@ -18,6 +18,17 @@ __all__ = ["conversion_to", "registry", "si_conversion", "usual_unit"]
 # units in which quantities are stated, by what they measure; the first that fits is taken
 _STATED: tuple[str, ...] = ("m", "m/s", "m/s²", "N", "N/m", "Pa", "J", "s", "Hz", "kg", "kg/m³", "m²", "m³")
 _STATED += ("K", "rad", "rad/s", "W", "V", "A", "Pa s", "mol")
+_STATED += (
+    "W/m²",
+    "W/m³",
+    "W/(m K)",
+    "W/(m² K)",
+    "J/(kg K)",
+    "1/K",
+    "m²/s",
+    "m³/s",
+    "kg/s",
+)  # of heat and flow
 _ANGLE = re.compile(r"\b(rad|deg(?!C|F|_)|rpm|rev|turn|cycle)", re.IGNORECASE)
 _SPELT = str.maketrans(
     {"µ": "u", "μ": "u", "·": "*", "⋅": "*", "²": "**2", "³": "**3", "^": "**", "°": "deg", "%": "percent"}

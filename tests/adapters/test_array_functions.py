@@ -72,6 +72,18 @@ class TestTorch:
         x = torch.from_numpy(rows(body, 2))
         assert torch.autograd.gradcheck(touch.energy, x.requires_grad_(), eps=1e-7, atol=1e-6, rtol=1e-4)
 
+    @pytest.mark.filterwarnings("ignore:`torch.jit.script` is deprecated")  # torch's own, at its first jvp
+    @pytest.mark.parametrize("derivative", ["jacrev", "jacfwd"])
+    def test_derivatives_of_derivatives_map_over_rows(self, torch, body, derivative):
+        """Of one row at a time, as torch.func has it: ∂F/∂x, and the same from the energy's second derivative."""
+        X, touch, D = rows(body, 40), self.function(body), body.energy.baseline.directions
+        x, felt, by = torch.from_numpy(X), len(D), getattr(torch.func, derivative)
+        bend = torch.func.vmap(by(lambda row: touch.force(row[None])[0]))(x)[..., :felt]
+        agree(bend, body.energy.stiffness(X) @ D.T, 1e-9)
+        twice = torch.func.vmap(torch.func.hessian(lambda row: touch.energy(row[None])[0]))(x)
+        inner = body.energy.inside(X)  # beyond the deepest training slopes are taken by differences
+        agree(-twice[inner][:, :felt, :felt], (D @ body.energy.stiffness(X) @ D.T)[inner], 1e-9)
+
     def test_single_precision_has_six_digits(self, torch, body):
         from palpate.adapters.torch import TorchBody
 

@@ -15,6 +15,7 @@ from palpate.errors import UsageError
 
 mujoco = pytest.importorskip("mujoco")
 
+from palpate.adapters.extra import import_extra
 from palpate.adapters.mujoco import SENSOR_VALUES, StiffStepWarning, attach
 from palpate.adapters.mujoco_mesh import MeshDrawing, add_mesh
 
@@ -22,15 +23,17 @@ TOP, MASS, GRAVITY = 0.1, 0.05, 9.81  # m, kg, m/s²
 BALL = f'<geom name="tool" type="sphere" size="{pressed.RADIUS}" mass="{MASS}"/>'
 
 
-def scene(step=5e-4, *, lift=0.02, damping=0.0, more="", ball=BALL, options=""):
+def scene_text(step=5e-4, *, lift=0.02, damping=0.0, more="", ball=BALL, options=""):
     """A ball on a vertical slide, `lift` above the top of a body whose frame lies at (0.3, 0, TOP)."""
-    return mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="{step}" gravity="0 0 -{GRAVITY}" {options}/><worldbody>
+    return f"""<mujoco><option timestep="{step}" gravity="0 0 -{GRAVITY}" {options}/><worldbody>
         <body name="carrier" pos="0.3 0 {TOP + lift}">
         <joint type="slide" axis="0 0 1" damping="{damping}"/>{ball}</body>
         <body name="table" pos="0 0 0"><geom size=".01" mass="1"/>{more}</body></worldbody>
         <sensor><user name="touch" dim="{len(SENSOR_VALUES)}" needstage="acc" datatype="real"/></sensor></mujoco>"""
-    )
+
+
+def scene(*args, **options):
+    return mujoco.MjModel.from_xml_string(scene_text(*args, **options))
 
 
 def placed(model, body, data=None, **options):
@@ -81,7 +84,7 @@ def test_no_step_is_too_long_and_no_body_too_stiff(modulus, step):
         warnings.simplefilter("always")
         contact, data = placed(model, pressed.surrogate(factor=modulus / 9e3))
         heights = []
-        for _ in range(20_000):
+        for _ in range(100_000):
             mujoco.mj_step(model, data)
             heights.append(data.qpos[0])
     assert np.isfinite(heights).all()
@@ -195,6 +198,21 @@ def test_what_does_not_fit_is_refused_in_words(ball, options, message):
     model = scene(ball=ball.replace('type="box" size="0.01"', 'type="box" size="0.01 0.01 0.01"'))
     with pytest.raises(UsageError, match=message):
         placed(model, pressed.surrogate(), **options)
+
+
+def test_ground_that_is_led_about_counts_as_moving():
+    """MuJoCo takes a mocap body for welded to the world, and so does it what hangs on one."""
+    text = scene_text().replace('<body name="table"', '<body mocap="true"><body name="table"', 1)
+    model = mujoco.MjModel.from_xml_string(text.replace("</worldbody>", "</body></worldbody>"))
+    with pytest.raises(UsageError, match="which can move"):
+        placed(model, pressed.surrogate(), on="table")
+    placed(model, pressed.surrogate(), on="table", moves=True)
+
+
+def test_a_missing_package_is_named_with_the_command_that_installs_it():
+    with pytest.raises(UsageError, match="needs the package no_such_simulator") as caught:
+        import_extra("no_such_simulator", "mujoco")
+    assert "pip install 'palpate[mujoco]'" in caught.value.fix
 
 
 def test_a_body_that_remembers_is_refused():

@@ -15,7 +15,6 @@ import palpate as pp
 from models import spring_beam
 from palpate.dataset.measured import read_measurements, write_measurements
 from palpate.learning.correction import correct
-from palpate.learning.plastic.load_histories import LoadHistories, LoadHistory
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
 from palpate.surrogates.memories import Relaxation
@@ -173,14 +172,11 @@ def test_a_network_alone_knows_its_ranges_and_no_deviation(palpate, fitted, tmp_
     assert "within the ranges" in palpate("ask", path, "--at", "0.1,0.2").out
 
 
-def test_histories_of_a_held_body_say_what_they_are(palpate, tmp_path):
-    one = LoadHistory(
-        *np.array([[0.0, 1.0], [0.0, 0.01], [0.0, 2.0], [0.0, 0.01], [0.0, 0.0]]), np.zeros((2, 3, 2))
-    )
-    path = LoadHistories(np.zeros((3, 2)), 2, np.array([0.0, 1.0]), (one,)).save(tmp_path / "paths.palpate")
-    assert "LoadHistories: 1 with 2 samples" in palpate("ask", path).out
+def test_histories_of_a_held_body_say_what_they_are(palpate):
+    path = Path(__file__).parents[1] / "data" / "former" / "histories.palpate"
+    assert "1 history with 50 samples" in palpate("ask", path).out
     answer = palpate("ask", path, "--at", "0,0,0")
-    assert (answer.code, "does not answer at a place" in answer.err) == (2, True)
+    assert (answer.code, "no learnt body and no network" in answer.err) == (2, True)
 
 
 @pytest.mark.full

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from palpate.dataset import Dataset, histories_of
 from palpate.learning.loading import load
-from palpate.learning.plastic import LoadHistories
 
 
 # forty seconds on two free cores; a busy machine is no failure
@@ -23,10 +23,10 @@ def test_the_rod_keeps_its_limits_and_leaves_everything_behind(palpate, tmp_path
     assert judged["passed"]
     assert judged["histories"]["count"] == 2
     body = load(tmp_path / "beam-plastic-quick.palpate")
-    unseen = LoadHistories.load(tmp_path / "beam-plastic-quick-unseen.palpate")
-    largest = max(np.abs(path.force).max() for path in unseen.paths)
+    unseen = histories_of(Dataset.open(tmp_path / "beam-plastic-quick-random.zarr"))
+    largest = max(np.abs(path.force).max() for path in unseen)
     off, elastic = [], []
-    for path in unseen.paths:
+    for path in unseen:
         places, direction = path.place[:, None], body.energy.baseline.directions[0]
         led = body.follow(places, path.times)
         off.append(np.abs(-led.force @ direction - path.force) / largest)

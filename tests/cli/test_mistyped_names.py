@@ -22,7 +22,7 @@ from pressed import surrogate
         ("fmu body.palpate", "palpate export fmu"),
         ("export simulink body.palpate", "palpate export fmu"),
         ("export htlm", "palpate export html"),
-        ("export Unity", "palpate export lib"),
+        ("export Unity", "palpate export unity"),
         ("material fti", "palpate material fit"),
         ("dataset imprt", "palpate dataset import"),
         ("devices simulate omega.7", "palpate devices simulate forcedimension"),

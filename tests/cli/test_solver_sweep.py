@@ -16,9 +16,6 @@ def test_no_other_command_runs_the_program(palpate, tmp_path):
         answer = palpate(command, path)
         assert answer.code == 2
         assert "Only `palpate sweep` starts that program" in answer.err
-    for option in (("--until", "2%"), ("--scheduler", "tcp://127.0.0.1:9")):
-        answer = palpate("sweep", path, *option)
-        assert answer.code == 2
     assert sorted(file.name for file in tmp_path.iterdir()) == ["bar.toml", "templates"]
 
 

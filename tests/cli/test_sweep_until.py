@@ -46,6 +46,27 @@ def test_solves_are_chosen_until_the_error_is_kept(palpate, study, tmp_path):
     assert palpate("validate", study, "--no-report").code in {0, 1}, "the surrogate is of this study's solves"
 
 
+@pytest.mark.full
+@pytest.mark.timeout(300)
+def test_touches_on_two_meshes_decide_the_size_of_the_elements(palpate, study, tmp_path):
+    """Elements of 12 mm don't feel a ball of 8 mm. The file says the new size, and the solves have it."""
+    swept = palpate("sweep", study, "--element", "auto")
+    assert swept.code == 0, swept.err
+    assert "elements of 6 mm, since the mesh's part is" in swept.err
+    assert Dataset.open(tmp_path / "tiny.zarr").provenance["problem"]["element"] == pytest.approx(0.006)
+    again = palpate("sweep", study, "--element", "auto")
+    assert again.code == 0, again.err
+    assert "their elements stay as they are" in again.err
+
+
+def test_a_body_that_no_ball_touches_keeps_its_elements(palpate, tmp_path):
+    study = tmp_path / "beam.toml"
+    assert palpate("init", study).code == 0
+    refused = palpate("sweep", study, "--element", "auto")
+    assert refused.code == 2
+    assert "No ball touches its body" in refused.err
+
+
 @pytest.mark.parametrize(
     ("options", "answer"),
     [
@@ -53,6 +74,7 @@ def test_solves_are_chosen_until_the_error_is_kept(palpate, study, tmp_path):
         (("--until", "2"), "out of range"),
         (("--until", "200%"), "out of range"),
         (("--minutes", "3"), "Give --until"),
+        (("--element", "3mm"), "[sweep] element"),
     ],
 )
 def test_options_that_say_nothing_are_refused(palpate, study, options, answer):

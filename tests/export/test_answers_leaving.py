@@ -20,6 +20,7 @@ from palpate.export.answer_network import answer_network, answers_of
 from palpate.export.check_fmu import open_instance
 from palpate.export.fmu_export import VERSIONS
 from palpate.export.onnx_export import export_onnx
+from palpate.learning.arrays.input_bends import log_bend
 from palpate.network import Network, Scaling, TrainedRegion
 from palpate.surrogates import LearntQuantities, Surrogate
 from palpate.units import Quantity, bounds
@@ -29,10 +30,12 @@ LOW, HIGH = bounds(RANGES)
 
 
 def quantities(radial: str, seed: int, names: tuple[str, ...]) -> LearntQuantities:
-    """Return numbers by a random network of rotated units, in a region of random points."""
+    """Return numbers by a random network of rotated units and a bent input, in a region of random points."""
     rng = np.random.default_rng(seed)
     m, units = len(names), 11
-    scaling = Scaling((LOW + HIGH) / 2, (HIGH - LOW) / 2, rng.normal(size=m), 10.0 ** rng.uniform(-3, 3, m))
+    ends = Scaling.of(RANGES, np.zeros((1, m)), bends=np.array([log_bend(*np.array([LOW, HIGH])[:, 0]), 0.0]))
+    outer = {"output_centre": rng.normal(size=m), "output_scale": 10.0 ** rng.uniform(-3, 3, m)}
+    scaling = dataclasses.replace(ends, **outer)
     network = Network(
         RANGES,
         tuple(Quantity(name, "K") for name in names),
@@ -56,9 +59,11 @@ def mixed() -> Surrogate:
 
 
 def places(count: int = 1000) -> np.ndarray:
-    """Return inputs in and beside the ranges."""
+    """Return inputs in and beside the ranges, and a few far outside, where a bent scale has ended."""
     span = HIGH - LOW
-    return np.random.default_rng(5).uniform(LOW - 0.3 * span, HIGH + 0.3 * span, (count, 2))
+    X = np.random.default_rng(5).uniform(LOW - 0.3 * span, HIGH + 0.3 * span, (count, 2))
+    X[: count // 50, 0] -= 2.0 * span[0]
+    return X
 
 
 def asked(path, X: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -171,7 +176,7 @@ def test_joined_networks_answer_what_the_parts_do():
     wanted = np.hstack([surrogate.predict(X), field, surrogate.fields["rise"].values(X)[:, :, 0]])
     np.testing.assert_allclose(answers.predict(X), wanted, atol=1e-12 * np.abs(wanted).max())
     assert len(answers.networks) == 3
-    assert answers_of(surrogate.quantities["gaussian"].network).networks[0].units == 11
+    assert answers_of(Surrogate.of(surrogate.quantities["gaussian"].network)).networks[0].units == 11
 
 
 @pytest.mark.parametrize(

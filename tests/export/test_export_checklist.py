@@ -114,7 +114,7 @@ def test_an_export_answers_as_palpate_does(exporter, name, tmp_path):
 def test_networks_alone_go_out(compiler, tmp_path):
     path = require_program(compiler)
     options = (*STRICT, *SANITIZED) if compiler == "gcc" else ("-Wall", "-Werror")
-    for i, network in enumerate(networks()):
+    for i, network in enumerate(map(pp.Surrogate.of, networks())):
         done = export_c(network, tmp_path / str(i), name="map", check=False)
         block = block_of(network, field=None, with_field=True, deviation=True)
         assert (compared := compare_c(network, block, done, path, single=False, options=options)).passed, str(

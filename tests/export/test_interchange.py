@@ -369,7 +369,7 @@ def test_the_card_reads_without_raw_data():
 
 def test_a_network_has_a_card_too():
     network = touch_energy().network
-    card = card_of(network)
+    card = card_of(palpate.Surrogate.of(network))
     assert card.answers["outputs"]
     assert "extrapolated" in " ".join(card.limits)
     assert "not checked" in " ".join(card.warnings)
@@ -379,7 +379,7 @@ def test_a_network_has_a_card_too():
 def test_the_card_of_a_fit_says_what_its_file_says(tmp_path):
     X = np.linspace(-1.0, 1.0, 60)
     fitted = Fitted.load(palpate.fit(X, np.sin(2 * X), effort=0.01).save(tmp_path / "sine.palpate"))
-    card = card_of(fitted, tmp_path / "sine.palpate")
+    card = fitted.card(tmp_path / "sine.palpate")
     assert card.trained_on["samples"] == 60
     assert card.errors["error on samples held out, relative to the outputs' spread"] == fitted.heldout
     assert card.warnings == fitted.notes

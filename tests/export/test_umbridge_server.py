@@ -16,12 +16,14 @@ import numpy as np
 import pytest
 
 import exported_bodies
+import palpate as pp
 from answering import answering
 from palpate.cli import main
 from palpate.errors import ResourceError, StudyError, UsageError
 from palpate.export.umbridge_server import UMBridgeServer, served_models
 from palpate.study.solver_study import read_solver_study
 from palpate.study.solver_sweep import sweep_solver
+from palpate.sweeps import umbridge_problem
 from palpate.units import Range
 from system_programs import require_package
 from waiting import wait_for
@@ -30,8 +32,8 @@ SPRING = Path(__file__).parents[1] / "data" / "solver_case" / "umbridge_spring.p
 
 
 @contextlib.contextmanager
-def serving(models):
-    server = UMBridgeServer(models)
+def serving(models, port=0):
+    server = UMBridgeServer(models, port)
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
     try:
@@ -92,7 +94,7 @@ def test_the_clients_answers_are_those_of_the_body_with_its_slopes(umbridge, tou
 def test_slopes_are_those_of_the_values(umbridge):
     """A network, by central differences of what is served."""
     network = exported_bodies.random_network((Range("a", 0, 1, "m"), Range("b", -1, 1, "N")), seed=3)
-    with serving(served_models(network)) as server:
+    with serving(served_models(pp.Surrogate.of(network))) as server:
         model = umbridge.HTTPModel(server.url, "outputs")
         x, m = np.array([0.4, 0.2]), model.get_output_sizes()[0]
         sens, vec, step = np.linspace(1, 2, m), np.array([0.7, -0.4]), 1e-5
@@ -219,6 +221,30 @@ random = 0
 """
 
 
+ROD = """
+name = "rod"
+
+[solver]
+url = "{url}"
+model = "largest"
+
+[[inputs]]
+name = "heat"
+range = ["1e5 W/m^3", "5e5 W/m^3"]
+unit = "W/m^3"
+
+[[inputs]]
+name = "conductivity"
+range = ["10 W/(m K)", "40 W/(m K)"]
+unit = "W/(m K)"
+
+[[mapping.outputs]]
+name = "largest"
+from = "output"
+unit = "K"
+"""
+
+
 @pytest.fixture(scope="module")
 def spring(umbridge):
     """Address of a server of the `umbridge` package, in a process of its own."""
@@ -257,6 +283,38 @@ def test_a_model_of_the_package_is_swept(spring, tmp_path):
     lies = solver.solve(np.array([0.0005, 0.5]))
     assert not lies.converged
     assert "Evaluate" in lies.message or "number" in lies.message
+
+
+@pytest.mark.parametrize("returns", [True, False])
+def test_an_outage_of_the_server_costs_nothing_where_it_is_short_else_the_case(
+    returns, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(umbridge_problem, "_PAUSES", (0.3, 0.3))
+    models, x = served_models(answering()), np.array([3e5, 20.0])
+    path = tmp_path / "served.toml"
+    with serving(models) as server:
+        path.write_text(ROD.format(url=server.url))
+        problem = read_solver_study(path).problem(tmp_path, 30.0)
+        problem.check()
+        solver = problem.open()
+        assert solver.solve(x).largest == answering().predict(x[None])[0, 0]
+    with contextlib.ExitStack() as stack:
+        ends = threading.Event()
+
+        def serve_again():
+            with serving(models, server.server_address[1]):
+                ends.wait()
+
+        again = threading.Timer(0.1, serve_again)
+        stack.callback(again.cancel)
+        stack.callback(ends.set)
+        if returns:
+            again.start()
+        answer = solver.solve(x)
+    assert answer.converged is returns
+    if not returns:
+        assert "does not answer Evaluate" in answer.message
+        assert "Start it again" in answer.message
 
 
 @pytest.mark.full

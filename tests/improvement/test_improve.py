@@ -170,9 +170,10 @@ def test_another_bodys_solves_are_refused(improve, tmp_path):
 
 
 def test_wrong_arguments_are_refused():
-    spring = ExternalProblem(PressedSlab().ranges, PressedSlab().layout, (), dict, {})
-    with pytest.raises(UsageError, match="one probe"):
-        next(iter(pp.improve(spring)))
+    held = {"interactions": [{"type": "glued pad"}]}
+    gripped = ExternalProblem(PressedSlab().ranges, PressedSlab().layout, (), dict, held)
+    with pytest.raises(UsageError, match="under one probe"):
+        next(iter(pp.improve(gripped)))
     with pytest.raises(UsageError, match="rule"):
         next(iter(pp.improve(PressedSlab(), rule="guess")))
     with pytest.raises(UsageError, match="option until"):

@@ -77,8 +77,8 @@ def test_what_does_not_know_tools_refuses_them(ball, tmp_path):
     for export in (export_c, export_onnx):
         with pytest.raises(UsageError, match="can't be exported yet"):
             export(ball, tmp_path / "ball.onnx")
-    with pytest.raises(UsageError, match="tool"):
-        pp.validate(ball, pressed.dataset(pressed.solves()))
+    with pytest.raises(UsageError, match="solves of the tool that"):
+        pp.validate(ball, under(PosedTool(Capsule(0.006, 0.03))))
 
 
 def test_the_deepest_point_of_a_tilted_tool():

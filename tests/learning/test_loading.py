@@ -8,13 +8,7 @@ import pytest
 import palpate as pp
 from models import spring_beam
 from palpate.errors import FileFormatError
-from palpate.learning.plastic import LoadHistories, LoadHistory
 from palpate.network import Archive, save_archive
-
-
-def histories() -> LoadHistories:
-    one = LoadHistory(np.ones(1), *np.ones((4, 1)), np.zeros((1, 2, 2)))
-    return LoadHistories(np.array([[0.0, 0.0], [1.0, 0.0]]), 1, np.array([0.0, -1.0]), (one,))
 
 
 @pytest.mark.full
@@ -22,7 +16,7 @@ def test_whatever_a_file_holds_comes_back_as_what_it_is(tmp_path):
     beam, x = spring_beam(), np.linspace(-1.0, 1.0, 30)[:, None]
     fitted = pp.fit(x, x**2, effort=0.05, workers=1)
     network = beam.energy.network
-    for i, thing in enumerate((beam, fitted, network, histories())):
+    for i, thing in enumerate((beam, fitted, network)):
         again = pp.load(thing.save(tmp_path / f"{i}.palpate"))
         assert type(again) is type(thing)
         if not isinstance(thing, pp.Fitted):  # what was tried is not kept

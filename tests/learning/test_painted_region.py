@@ -11,6 +11,7 @@ from palpate.errors import UsageError
 from palpate.learning.painted_region import DEVIATION, MOST, SLACK, cover, painted_region
 from palpate.surrogates.model_card import card_of
 from palpate.validation import validate
+from palpate.validation.limits import FORCE_JND, Limits
 from pressed import DEEPEST, RADIUS, places, solves, surrogate
 
 PAINT = 0.015  # half the side of the painted square, m
@@ -63,6 +64,10 @@ def test_the_paint_is_trained_and_its_surroundings_are_not():
     assert painted.painted_area == pytest.approx(4 * PAINT**2)
     assert painted.trained_area == pytest.approx(painted.painted_area * inside[beyond < 0].mean(), rel=0.02)
     assert len(painted.region.points) <= MOST
+
+
+def test_a_force_less_sure_than_a_hand_can_tell_is_not_trained():
+    assert DEVIATION == FORCE_JND == Limits().force_p95
 
 
 @pytest.mark.full

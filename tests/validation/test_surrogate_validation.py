@@ -232,19 +232,21 @@ def test_the_worst_cases_are_named_with_their_inputs_and_forces() -> None:
 
 
 def test_a_mesh_beyond_its_limit_keeps_a_surrogate_from_passing() -> None:
-    """Three touches on a finer mesh suffice, of which the worst counts; verdict and file tell the mesh's part."""
+    """Three touches on a finer mesh suffice, by mean and deviation; verdict and file tell the mesh's part."""
     test = solves()
     heavy = np.flatnonzero(np.linalg.norm(test.force, axis=1) > 0.5)[:3]
     fine = TouchSolves(test.X[heavy], test.force[heavy] * np.array([1.0, 0.97, 1.01])[:, None])
-    part = 4 / 3 * 0.03 / 0.97
+    off = np.array([0.0, 0.03 / 0.97, 0.01 / 1.01])
+    part = 4 / 3 * (off.mean() + 1.645 * off.std(ddof=1))
+    assert part > 4 / 3 * off.max()
     loose, strict = (
-        validate(surrogate(), test, refined=fine, limits=Limits(mesh_force=m)) for m in (0.05, 0.035)
+        validate(surrogate(), test, refined=fine, limits=Limits(mesh_force=m)) for m in (0.06, 0.035)
     )
     assert loose.mesh_part == pytest.approx(part)
     assert "mesh_force" not in missed(loose)
     assert "mesh_force" in missed(strict)
     assert "element" in strict.failures[0].criterion.fix
-    assert "force ± 4.1 % in all, of it the mesh 4.1 %" in verdict(loose)[1]
+    assert "force ± 5.3 % in all, of it the mesh 5.3 %" in verdict(loose)[1]
     assert loose.summary()["force error, the mesh's part"] == pytest.approx(part)
     assert validate(surrogate(), test).mesh_part is None
 

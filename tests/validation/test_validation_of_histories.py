@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from models import DOWN, linear_network, planar_field, spring_energy
+from palpate.dataset import Dataset, Layout, LoadHistory
+from palpate.dataset.histories import history_dataset
 from palpate.errors import AccuracyError, UsageError
-from palpate.learning.plastic import LoadHistories, LoadHistory
 from palpate.surrogates import Surrogate
 from palpate.surrogates.memories import IwanElements
 from palpate.units import Quantity, Range
@@ -37,7 +37,7 @@ def rod() -> Surrogate:
     return Surrogate(energy, {"displacement": field}, elements, {"name": "rod"})
 
 
-def solved(off: float = OFF, dented: float = 0.0) -> LoadHistories:
+def solved(off: float = OFF, dented: float = 0.0, rest: np.ndarray = REST) -> Dataset:
     """To 30 mm, where 4 N hold it and 20 mm have slipped, and back to 10 mm, where nothing does."""
     place = np.concatenate([np.linspace(0.001, 0.03, 30), np.linspace(0.029, 0.01, 20)])
     led = rod().follow(place[:, None])
@@ -46,7 +46,8 @@ def solved(off: float = OFF, dented: float = 0.0) -> LoadHistories:
     shape = np.zeros((len(place), 2, 2))
     shape[:, 1, 1] = -place - dented
     path = LoadHistory(np.arange(1.0, 1.0 + len(place)), place, force, led.stored, led.lost, shape)
-    return LoadHistories(REST[:, :2], 1, np.array([0.0, -1.0]), (path,))
+    layout, origin = Layout(rest[:, :2], None, [1], [[0.0, -1.0]]), {"problem": {"body": {"type": "rod"}}}
+    return history_dataset([path], Range("P", -5.0, 5.0, "N"), layout, origin)
 
 
 def test_each_figure_is_what_was_put_in() -> None:
@@ -89,9 +90,9 @@ def test_energy_that_comes_back_is_a_miss() -> None:
 
 def test_histories_of_another_mesh_are_refused() -> None:
     with pytest.raises(UsageError, match="are not the 2 nodes"):
-        validate(rod(), replace(solved(), rest=REST[:, :2] + 0.1))
+        validate(rod(), solved(rest=REST + 0.1))
     with pytest.raises(UsageError, match="no history"):
-        validate(rod(), replace(solved(), paths=()))
+        validate(rod(), solved().take([]))
 
 
 @pytest.mark.full

@@ -111,6 +111,11 @@ def _step(step: Step, large: bool) -> list[str]:
 
 def run(program: str, folder: Path, text: str) -> list[Answer]:
     """Answers at the end of each step."""
+    return answers(output(program, folder, text))
+
+
+def output(program: str, folder: Path, text: str) -> str:
+    """What the program writes into `body.dat` for an input."""
     (folder / "body.inp").write_text(text)
     alone = {**os.environ, "OMP_NUM_THREADS": "1"}
     done = subprocess.run(
@@ -124,7 +129,7 @@ def run(program: str, folder: Path, text: str) -> list[Answer]:
     )
     assert done.returncode == 0, done.stdout[-2000:]
     assert "*ERROR" not in done.stdout, done.stdout[-2000:]
-    return answers((folder / "body.dat").read_text())
+    return (folder / "body.dat").read_text()
 
 
 def answers(text: str) -> list[Answer]:

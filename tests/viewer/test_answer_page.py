@@ -12,7 +12,7 @@ from chromium_page import assert_no
 from playwright.sync_api import Browser, Page
 
 import palpate as pp
-from answering import LENGTH, RANGES, answering, plate_mesh, quantities
+from answering import LENGTH, RANGES, answering, plate_mesh, quantities, rod_solves
 from palpate.network.radial import radial
 from palpate.surrogates import LearntQuantities, MeshPlaces, ModalField, Surrogate
 from palpate.viewer import answer_page
@@ -221,3 +221,28 @@ def test_the_served_page_is_the_same(browser: Browser):
 def test_a_field_without_room_is_left_out_by_name(monkeypatch: pytest.MonkeyPatch, tmp_path):
     monkeypatch.setattr(answer_page, "LARGEST", 0)
     assert export_html(plate(), tmp_path / "plate.html").left_out == ("temperature", "displacement", "flux")
+
+
+def test_the_nearest_solve_is_drawn_beside_with_its_own_values(browser: Browser, tmp_path):
+    data = rod_solves(names=("temperature", "flux"))
+    body, _ = pp.learn(data, name="rod")
+    page, complaints = opened(browser, export_html(body, tmp_path / "rod.html").file.as_uri(), offline=True)
+    row = 7  # a solve: near it, it is the nearest
+    low, high = np.array([[r.low, r.high] for r in RANGES]).T
+    x = data.X[row] + 1e-3 * (high - low)
+    told = page.evaluate("(x) => palpate.ask(x)", x.tolist())["nearest"]
+    for values, facts in zip(told, page.evaluate("palpate.facts.fields"), strict=True):
+        wanted = data[facts["name"]][row].ravel()
+        # modes in single precision
+        np.testing.assert_allclose(values, wanted, atol=1e-4 * np.ptp(data[facts["name"]]))
+    before = page.locator("#view").screenshot()
+    button = page.locator("#beside")
+    button.click()
+    assert button.get_attribute("aria-pressed") == "true"
+    assert "right: the nearest solve" in page.locator("#scale-notes").text_content()
+    page.wait_for_timeout(300)  # two pictures
+    assert page.locator("#view").screenshot() != before
+    button.click()
+    assert "nearest solve" not in page.locator("#scale-notes").text_content()
+    assert_no(complaints)
+    page.context.close()

@@ -96,8 +96,8 @@ def page(browser: Browser, command: Command, complaints: list[str]) -> Iterator[
 def test_a_scan_that_cuts_itself_is_wrapped_by_a_click(command, page, keep):
     words = page.inner_text("#refusal-words")
     assert "cuts itself" in words
-    assert "--wrap 0.7mm" in words, "an eightieth of its length of 58 mm"
-    assert page.inner_text("#wrap") == "wrap it (0.7 mm)"
+    assert "--wrap 1mm" in words, "a fortieth of its length of 58 mm"
+    assert page.inner_text("#wrap") == "wrap it (1 mm)"
     assert page.is_hidden("#part-section")
     keep(page, "part-refused")
 
@@ -142,6 +142,6 @@ def test_a_refusal_that_nobody_mends_is_the_commands_error(command, page):
     command.end()
     (failure,) = command.failures
     assert "cuts itself" in failure.what
-    assert failure.wrap == pytest.approx(0.7e-3)
+    assert failure.wrap == pytest.approx(1e-3)
     assert not command.begun
     assert not study_file(command.scan).exists()

@@ -322,7 +322,7 @@ def attach(
             fix="Attach it without: body.with_memory(None).",
         )
     tool, base = _index(mujoco, model, "geom", geom), _index(mujoco, model, "body", on)
-    if base and int(model.body_weldid[base]) and not moves:
+    if _can_move(model, base) and not moves:
         raise UsageError(
             f"The body stands on {on!r}, which can move.",
             why="A learnt body has no inertia: what it stands on must be fixed, or move slowly.",
@@ -353,6 +353,17 @@ def attach(
     _FORMER.update(call_for(mujoco, model, {"passive": _add_forces, "sensor": _write_sensors}))
     mujoco.mj_forward(model, data)
     return contact
+
+
+def _can_move(model: Any, body: int) -> bool:
+    """Return whether a body has a joint, or is led as a mocap body, by itself or by what bears it."""
+    if int(model.body_weldid[body]):
+        return True
+    while body:
+        if int(model.body_mocapid[body]) >= 0:
+            return True
+        body = int(model.body_parentid[body])
+    return False
 
 
 def _unit(quaternion: np.ndarray) -> np.ndarray:

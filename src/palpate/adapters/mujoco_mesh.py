@@ -91,8 +91,8 @@ def add_mesh(
 
 
 def _displacement(body: Surrogate) -> FieldSurrogate:
-    shown = body.fields.get("displacement")
-    if not isinstance(shown, FieldSurrogate):
+    shown = body.surface_fields.get("displacement")
+    if shown is None:
         raise UsageError(
             f"The body {body.name!r} has no surface to draw.",
             why="It was learnt without its displacement, or it is drawn as a line.",

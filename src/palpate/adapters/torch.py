@@ -4,7 +4,8 @@
     U = touch.energy(x)                     # (N,) J, of inputs (N, n); U.sum().backward() gives −F
     F = touch.force(x)                      # (N, 3) N
 
-The numbers are those of palpate's own kernels to rounding, for any number of rows on any device of torch.
+The numbers are those of palpate's own kernels to rounding, for any number of rows on any device of torch. In double
+precision on the processor the kernels themselves answer energy, force and stiffness, each one's slope being the next.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 
 from palpate.adapters.array_program import Operators, program_of
 from palpate.adapters.extra import import_extra
+from palpate.adapters.torch_kernels import SLOPES, kernel_function
 from palpate.errors import UsageError
 from palpate.surrogates import Surrogate
 
@@ -53,10 +55,11 @@ class TorchBody:
         self._programs = program_of(self.body, kinds[self.dtype])
         self._operators = _operators(torch, self.dtype)
         self._constants: dict[Any, dict[str, Mapping[str, Any]]] = {}
+        self._kernels = kernel_function(torch, self.body, self._run_program)
 
     def energy(self, x: Any) -> Any:
         """Return U (N,), J, at inputs x (N, n): the felt coordinates in m first."""
-        return self._run("energy", x)[:, 0]
+        return self._run("energy", x)
 
     def force(self, x: Any) -> Any:
         """Return F = −∂U/∂x (N, 3), N, on the hand."""
@@ -98,11 +101,19 @@ class TorchBody:
                 why=f"They are {', '.join(r.name for r in self.body.inputs)}.",
                 fix="Convert them, or make the body with that dtype.",
             )
+        if name in SLOPES and self.dtype == torch.float64 and x.device.type == "cpu":
+            return self._kernels.apply(x, name)[0]
+        return self._run_program(name, x)
+
+    def _run_program(self, name: str, x: Any) -> Any:
+        """Return an output at checked rows by torch's own operators; the energy is (N,)."""
+        torch, program = self._torch, self._programs[name]
         there = self._constants.setdefault(x.device, {})
         if name not in there:
             there[name] = {k: torch.tensor(v, device=x.device) for k, v in program.constants.items()}
         parts = [program.run(some, there[name], self._operators) for some in x.split(_TOGETHER)]
-        return parts[0] if len(parts) == 1 else torch.cat(parts)
+        whole = parts[0] if len(parts) == 1 else torch.cat(parts)
+        return whole[:, 0] if name == "energy" else whole
 
 
 def _numbers(value: Any) -> list[int]:

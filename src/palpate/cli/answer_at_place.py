@@ -10,19 +10,15 @@ from typing import Any
 import numpy as np
 
 from palpate.format import share
-from palpate.learning import Fitted
-from palpate.network import Network
 from palpate.surrogates import ModalField, Surrogate
 from palpate.units import Quantity, Range, bounds
 
 __all__ = [
     "Answer",
-    "Answers",
     "Deflection",
     "FieldSummary",
     "Prediction",
     "outside",
-    "predictions",
     "surrogate_answers",
 ]
 
@@ -106,38 +102,6 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Prediction:
-    """Outputs at one place."""
-
-    inputs: np.ndarray  # (n,) in the inputs' units
-    outputs: tuple[Quantity, ...]  # names and units of the m outputs
-    values: np.ndarray  # (m,) in the outputs' units
-    # (m,) of what would be measured; None where the file has none, not-a-number beyond the ranges
-    deviations: np.ndarray | None
-    inside: bool | None  # whether a training sample is near; None where the file does not tell
-
-    def words(self, names: Sequence[Range]) -> str:
-        """Return the answer as lines for a person."""
-        lines = [_place_in_words(self.inputs, names)]
-        width = max((len(output.name) for output in self.outputs), default=0)
-        sure = [None] * len(self.values) if self.deviations is None else self.deviations
-        for output, value, deviation in zip(self.outputs, self.values, sure, strict=True):
-            spread = "" if deviation is None or math.isnan(deviation) else f" ± {deviation:.2g}"
-            lines.append(f"  {output.name:{width}}  {value:.6g}{spread} {output.unit}".rstrip())
-        return "\n".join([*lines, f"  trust: {_trust_in_words(self.inputs, names, inside=self.inside)}"])
-
-    def as_dict(self, names: Sequence[Range]) -> dict[str, Any]:
-        """Return the outputs as data for a program; `beyond` are the inputs out of range."""
-        return {
-            "inputs": self.inputs.tolist(),
-            "outputs": {output.name: float(v) for output, v in zip(self.outputs, self.values, strict=True)},
-            "deviations": None if self.deviations is None else self.deviations.tolist(),
-            "inside": self.inside,
-            "beyond": _names_beyond(self.inputs, names),
-        }
-
-
-@dataclass(frozen=True)
 class FieldSummary:
     """The least, largest and mean value of a field or curve at one place of the inputs."""
 
@@ -184,21 +148,38 @@ class FieldSummary:
 
 
 @dataclass(frozen=True)
-class Answers:
+class Prediction:
     """Numbers and fields of a surrogate without touch at one place."""
 
-    numbers: Prediction
-    fields: tuple[FieldSummary, ...]
+    inputs: np.ndarray  # (n,) in the inputs' units
+    outputs: tuple[Quantity, ...]  # names and units of the m outputs
+    values: np.ndarray  # (m,) in the outputs' units
+    # (m,) of what would be measured; None where the file has none, not-a-number beyond the ranges
+    deviations: np.ndarray | None
+    inside: bool | None  # whether a training sample is near; None where the file does not tell
+    fields: tuple[FieldSummary, ...] = ()
 
     def words(self, names: Sequence[Range]) -> str:
-        """Return the answers as lines for a person."""
-        place, *lines, trust = self.numbers.words(names).split("\n")
-        return "\n".join([place, *lines, *(one.words() for one in self.fields), trust])
+        """Return the answer as lines for a person."""
+        lines = [_place_in_words(self.inputs, names)]
+        width = max((len(output.name) for output in self.outputs), default=0)
+        sure = [None] * len(self.values) if self.deviations is None else self.deviations
+        for output, value, deviation in zip(self.outputs, self.values, sure, strict=True):
+            spread = "" if deviation is None or math.isnan(deviation) else f" ± {deviation:.2g}"
+            lines.append(f"  {output.name:{width}}  {value:.6g}{spread} {output.unit}".rstrip())
+        lines += [one.words() for one in self.fields]
+        return "\n".join([*lines, f"  trust: {_trust_in_words(self.inputs, names, inside=self.inside)}"])
 
     def as_dict(self, names: Sequence[Range]) -> dict[str, Any]:
-        """Return the answers as data for a program."""
-        fields = {one.name: one.as_dict() for one in self.fields}
-        return self.numbers.as_dict(names) | ({"fields": fields} if fields else {})
+        """Return the outputs as data for a program; `beyond` are the inputs out of range."""
+        return {
+            "inputs": self.inputs.tolist(),
+            "outputs": {output.name: float(v) for output, v in zip(self.outputs, self.values, strict=True)},
+            "deviations": None if self.deviations is None else self.deviations.tolist(),
+            "inside": self.inside,
+            "beyond": _names_beyond(self.inputs, names),
+            **({"fields": {one.name: one.as_dict() for one in self.fields}} if self.fields else {}),
+        }
 
 
 @dataclass(frozen=True)
@@ -232,31 +213,24 @@ class Deflection:
         }
 
 
-def surrogate_answers(surrogate: Surrogate, X: np.ndarray) -> list[Answers]:
+def surrogate_answers(surrogate: Surrogate, X: np.ndarray) -> list[Prediction]:
     """Return the numbers and fields of a surrogate at inputs X (N, n)."""
     spread, trusted = surrogate.deviation(X), surrogate.trusted(X)
     spread = np.where(outside(X, surrogate.inputs).any(axis=1, keepdims=True), math.nan, spread)
-    fields = [shown for shown in surrogate.fields.values() if isinstance(shown, ModalField)]
-    rows = zip(X, surrogate.predict(X), spread, trusted, strict=True)
+    numbers, fields = surrogate.quantities.values(), surrogate.modal_fields.values()
+    # a network alone states neither
+    tells = bool(fields) or any(part.uncertainty is not None or part.region is not None for part in numbers)
     return [
-        Answers(
-            Prediction(x, surrogate.outputs, y, s, bool(i)), tuple(FieldSummary.of(one, x) for one in fields)
+        Prediction(
+            x,
+            surrogate.outputs,
+            y,
+            s if tells else None,
+            bool(i) if tells else None,
+            tuple(FieldSummary.of(one, x) for one in fields),
         )
-        for x, y, s, i in rows
+        for x, y, s, i in zip(X, surrogate.predict(X), spread, trusted, strict=True)
     ]
-
-
-def predictions(network: Network | Fitted, X: np.ndarray) -> list[Prediction]:
-    """Return the outputs at places (N, n)."""
-    if isinstance(network, Network):
-        return [
-            Prediction(x, network.outputs, y, None, None) for x, y in zip(X, network.predict(X), strict=True)
-        ]
-    outputs = network.network.outputs
-    Y, spread = (np.reshape(a, (len(X), -1)) for a in (network.predict(X), network.deviation(X)))
-    trusted = network.trusted(X)
-    spread = np.where(outside(X, network.network.inputs).any(axis=1, keepdims=True), math.nan, spread)
-    return [Prediction(x, outputs, y, d, bool(i)) for x, y, d, i in zip(X, Y, spread, trusted, strict=True)]
 
 
 def outside(values: np.ndarray, inputs: Sequence[Range]) -> np.ndarray:

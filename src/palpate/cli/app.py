@@ -406,12 +406,11 @@ def doctor(
 
 def _shows_answers(model: Path, *, port: int | None, browser: bool, strict_port: bool, token: bool) -> bool:
     """Serve the page of a surrogate without touch until interrupted; False, at once, for anything else."""
-    from palpate.learning.loading import load
-    from palpate.surrogates import Surrogate
+    from palpate.learning.loading import load_surrogate
     from palpate.viewer.answer_viewer import show_answers
 
-    thing = load(model)
-    if not isinstance(thing, Surrogate) or thing.can_be_touched:
+    thing = load_surrogate(model)
+    if thing.can_be_touched:
         return False
     show_answers(
         thing,

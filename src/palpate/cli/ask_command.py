@@ -11,14 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from palpate.cli.answer_at_place import Answer, Deflection, outside, predictions, surrogate_answers
+from palpate.cli.answer_at_place import Answer, Deflection, outside, surrogate_answers
 from palpate.cli.console import Console
 from palpate.errors import UsageError
 from palpate.format import count
-from palpate.learning import Fitted
-from palpate.learning.loading import load
-from palpate.learning.plastic.load_histories import LoadHistories
-from palpate.network import Network
+from palpate.learning.loading import load, surrogate_of
 from palpate.number_text import number_list
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import LearntEnergy, Surrogate
@@ -33,7 +30,7 @@ _NOUNS = {
     "Surrogate": "A learnt body",
     "Fitted": "A network of data, with intervals",
     "Network": "A network of data",
-    "LoadHistories": "Load histories",
+    "Dataset": "Load histories",
 }
 
 
@@ -63,33 +60,20 @@ def ask(model: Path, at: Sequence[str], console: Console) -> None:
         inputs = line.inputs
         answers: Sequence[Any] = deflections(line, _places(at, inputs))
         words = [one.words(inputs) for one in answers]
-    elif isinstance(contents, Surrogate) and not contents.can_be_touched:
-        answers = surrogate_answers(contents, _places(at, inputs))
-        words = [one.words(inputs) for one in answers]
-    elif isinstance(contents, Surrogate):
-        X = _places(at, inputs)
-        answers = answers_at(contents, X)
-        words = [one.words(inputs) for one in answers] + _reservations(contents)
-    elif isinstance(contents, Fitted | Network):
-        answers = predictions(contents, _places(at, inputs))
-        words = [one.words(inputs) for one in answers]
     else:
-        raise UsageError(
-            f"{model} holds a {what}, which does not answer at a place.",
-            why="Bodies that are pressed or gripped have an energy of place, networks of arrays outputs; others "
-            "answer to a hand that moves.",
-            fix="Try `palpate run` or `palpate view`, or the value that `pp.load` reads.",
-        )
+        surrogate = surrogate_of(contents, model.stem)
+        answer = answers_at if surrogate.can_be_touched else surrogate_answers
+        answers = answer(surrogate, _places(at, inputs))
+        words = [one.words(inputs) for one in answers]
+        words += _reservations(surrogate) if surrogate.can_be_touched else []
     content = {"model": str(model), "answers": [one.as_dict(inputs) for one in answers]}
     console.result("\n".join(words), content | _as_field(_warning(contents)))
 
 
 def _line_under_loads(contents: Any) -> NodeField | None:
     """Return the displacement of a beam that answers to its loads alone; None of anything else."""
-    shown = contents.fields.get("displacement") if isinstance(contents, Surrogate) else None
-    if isinstance(shown, NodeField) and shown.asked_by == "load" and contents.memory is None:
-        return shown
-    return None
+    shown = getattr(contents, "line", None)
+    return shown if shown is not None and shown.asked_by == "load" and contents.memory is None else None
 
 
 def deflections(line: NodeField, X: np.ndarray) -> list[Deflection]:
@@ -100,9 +84,7 @@ def deflections(line: NodeField, X: np.ndarray) -> list[Deflection]:
 
 def inputs_of(asked: Any) -> tuple[Range, ...]:
     """Return the ranges of the n inputs; none of histories."""
-    if isinstance(asked, LoadHistories):
-        return ()
-    return tuple(asked.network.inputs if isinstance(asked, Fitted) else asked.inputs)
+    return tuple(getattr(getattr(asked, "network", asked), "inputs", ()))
 
 
 def answers_at(body: Surrogate, X: np.ndarray) -> list[Answer]:

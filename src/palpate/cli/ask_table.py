@@ -10,17 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from palpate.cli.answer_at_place import Prediction, predictions, surrogate_answers
-from palpate.cli.ask_command import answers_at, inputs_of
+from palpate.cli.answer_at_place import Prediction, surrogate_answers
+from palpate.cli.ask_command import answers_at
 from palpate.cli.console import Console
 from palpate.errors import UsageError
 from palpate.files import write_file
 from palpate.format import by_number, count
-from palpate.learning import Fitted
-from palpate.learning.loading import load
-from palpate.network import Network
+from palpate.learning.loading import load_surrogate
 from palpate.output_files import require_outputs
-from palpate.surrogates import Surrogate
 from palpate.tables import Table, read_table
 from palpate.units import Range
 
@@ -41,15 +38,10 @@ def ask_table(
     Columns are matched by name, others are left out, units are converted. `reading` is how the table is written, as
     `palpate.tables.read_table` takes it; `force` replaces a table that exists.
     """
-    contents = load(model)
-    if not isinstance(contents, Surrogate | Fitted | Network):
-        raise UsageError(
-            f"{model} holds a {type(contents).__name__}, which does not answer at a place.",
-            fix="Ask a network of arrays, or a body that is pressed or gripped.",
-        )
+    surrogate = load_surrogate(model)
     if out is not None:
         require_outputs([out], endings=(".csv",), inputs=(path, model), overwrite=force)
-    inputs = inputs_of(contents)
+    inputs, felt = surrogate.inputs, surrogate.can_be_touched
     table = read_table(path, **reading)
     X = _inputs(table, inputs, model)
     whole = np.isfinite(X).all(axis=1)
@@ -59,14 +51,7 @@ def ask_table(
     asked = X[whole]
     answers: Sequence[Any] = []
     if len(asked):
-        answers = (
-            predictions(contents, asked)
-            if not isinstance(contents, Surrogate)
-            else answers_at(contents, asked)
-            if contents.can_be_touched
-            else [one.numbers for one in surrogate_answers(contents, asked)]
-        )
-    felt = isinstance(contents, Surrogate) and contents.can_be_touched
+        answers = answers_at(surrogate, asked) if felt else surrogate_answers(surrogate, asked)
     head, rows = (_of_bodies if felt else _of_networks)(answers)
     named = ["line", *(f"{r.name} [{r.unit}]" if r.unit else r.name for r in inputs), *head]
     text = _as_csv(named, table.lines, X, whole, rows, len(head))

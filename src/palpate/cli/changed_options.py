@@ -59,7 +59,7 @@ def require_same(file: Path, study: Study, choices: PartOptions) -> None:
 
 def chosen_words(study: Study) -> str:
     """Return what was chosen for a part, in one sentence."""
-    from palpate.study.interaction_records import ProbeRecord
+    from palpate.study.probe_kind import ProbeRecord
 
     acting, held = study.interaction, ", ".join(study.body.fixed_names())
     assert isinstance(acting, ProbeRecord)
@@ -86,9 +86,9 @@ def _words(name: str, value: Any) -> str:
 
 def _choices_of(study: Study) -> dict[str, Any]:
     """Return what the study of a part says of the options."""
-    from palpate.study.interaction_records import ProbeRecord
     from palpate.study.material_records import SolidMaterialRecord
     from palpate.study.part_records import PartRecord
+    from palpate.study.probe_kind import ProbeRecord
 
     body, acting = study.body, study.interaction
     if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord):

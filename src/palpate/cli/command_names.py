@@ -19,7 +19,9 @@ __all__ = ["CommandGroup", "command_paths"]
 
 MEANT = {
     **dict.fromkeys(("simulink", "fmi", "modelica", "dymola", "openmodelica"), "export fmu"),
-    **dict.fromkeys(("unity", "unreal", "matlab", "library", "dll"), "export lib"),
+    **dict.fromkeys(("matlab", "library", "dll"), "export lib"),
+    **dict.fromkeys(("unity", "unity3d"), "export unity"),
+    **dict.fromkeys(("unreal", "ue5"), "export unreal"),
     **dict.fromkeys(("c99", "arduino", "embedded"), "export c"),
     **dict.fromkeys(("paraview", "vtk"), "export vtu"),
     **dict.fromkeys(("blender", "glb"), "export gltf"),

@@ -67,7 +67,7 @@ def card(
 ) -> None:
     """Print the record of a model for other people: origin, author, errors, limits, hashes and licence, as a page."""
     from palpate.files import write_file
-    from palpate.learning.loading import load
+    from palpate.learning.loading import load, surrogate_of
     from palpate.output_files import with_seal
     from palpate.surrogates.model_card import card_of
 
@@ -89,7 +89,7 @@ def card(
             )
         model = model.signed(author, licence)
         model.save(file)
-    found = card_of(model, file)
+    found = card_of(surrogate_of(model, file.stem), file)
     if out is not None:
         text = found.to_json() + "\n" if out.suffix.lower() == ".json" else found.to_markdown()
         write_file(out, with_seal(out, text))

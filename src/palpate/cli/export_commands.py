@@ -18,16 +18,15 @@ from palpate.errors import UsageError
 from palpate.number_text import whole_number
 
 if TYPE_CHECKING:
-    from palpate.export import ExportedC, ExportedFmu
+    from palpate.export import ExportedC, ExportedFmu, ExportedPackage
     from palpate.export.check_points import ExportedFile
-    from palpate.network import Network
     from palpate.surrogates import Surrogate
 
 __all__ = ["export_app"]
 
 export_app = typer.Typer(
     cls=CommandGroup,
-    help="Take a learnt body or a network into other tools: C99, a library, an FMU, ONNX, one HTML file.",
+    help="Take a learnt body or a network into other tools: C99, library, FMU, ONNX, Unity, Unreal, one HTML file.",
     no_args_is_help=True,
 )
 
@@ -65,25 +64,6 @@ _NO_COMPILER = "no C compiler was found"
 _NOT_INSTALLED = "{} is not installed (pip install 'palpate[{}]')"
 
 
-def _read(file: Path) -> Surrogate | Network:
-    """Return the body or the network of a file."""
-    from palpate.learning.loading import load
-    from palpate.network import Network
-    from palpate.surrogates import Surrogate
-
-    thing = load(file)
-    if isinstance(thing, Surrogate):
-        return thing
-    thing = getattr(thing, "network", thing)
-    if not isinstance(thing, Surrogate | Network):
-        raise UsageError(
-            f"{file} holds no learnt body and no network.",
-            why="These are what other tools can evaluate.",
-            fix="Give a file of `palpate learn` or `palpate fit`.",
-        )
-    return thing
-
-
 def _name_of(file: Path) -> str:
     """Return the beginning of names in C after a file."""
     from palpate.export.weights_block import identifier
@@ -94,39 +74,30 @@ def _name_of(file: Path) -> str:
 
 def _surrogate(file: Path) -> Surrogate:
     """Return the surrogate of a file; a network alone is one that answers its outputs."""
-    from palpate.surrogates import LearntQuantities, Surrogate
+    from palpate.learning.loading import load_surrogate
 
-    thing = _read(file)
-    if isinstance(thing, Surrogate):
-        return thing
-    return Surrogate(meta={"name": file.stem}, quantities={"outputs": LearntQuantities(thing)})
+    return load_surrogate(file)
 
 
 def _body(file: Path) -> Surrogate:
     """Return the surrogate of a file that a hand feels."""
     thing = _surrogate(file)
-    if not thing.can_be_touched:
-        raise UsageError(
-            f"{file} can't be touched.",
-            why="This way out is for learnt bodies, which answer a hand.",
-            fix="Take it out with `palpate export fmu`, `lib`, `c` or `onnx`.",
-        )
+    _ = thing.hand_energy  # which refuses one without touch
     return thing
 
 
-def _say_left_out(console: Console, thing: Surrogate | Network, done: ExportedC, *, no_field: bool) -> None:
+def _say_left_out(console: Console, thing: Surrogate, *, no_field: bool) -> None:
     """Say that the shape of a beam did not go out, and why."""
-    fields = list(getattr(thing, "fields", ()))
-    if fields and not done.field and not no_field:
+    if thing.line is not None and not no_field:
         console.say(
-            f"left out: the field {fields[0]}, since it is at the nodes of a beam, and the evaluator core knows "
+            f"left out: the field {thing.line.name}, since it is at the nodes of a beam, and the evaluator core knows "
             "fields on surfaces; force and energy are the same"
         )
 
 
 def _print(
     console: Console,
-    done: ExportedC | ExportedFmu | ExportedFile,
+    done: ExportedC | ExportedFmu | ExportedFile | ExportedPackage,
     files: Sequence[Path],
     missing: str,
     *,
@@ -176,7 +147,7 @@ def to_c(
     """
     from palpate.export import export_c
 
-    thing, console = _read(file), Console(as_json)
+    thing, console = _surrogate(file), Console(as_json)
     done = export_c(
         thing,
         file.with_name(name or file.stem) if out is None else out,
@@ -189,7 +160,7 @@ def to_c(
         compiler=compiler,
         overwrite=force,
     )
-    _say_left_out(console, thing, done, no_field=no_field)
+    _say_left_out(console, thing, no_field=no_field)
     _print(console, done, done.files, _NO_COMPILER, no_check=no_check)
     words = shlex.join(map(str, (done.example, *done.sources)))
     console.say(f"Next: cc -O2 {words} -lm && ./a.out")
@@ -208,7 +179,7 @@ def to_library(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Compile a shared library with a plain C ABI, with wrappers for Python, Unity, Unreal and MATLAB.
+    """Compile a shared library with a plain C ABI, with wrappers for Python and MATLAB.
 
     Without a C compiler the sources and their CMake file are written, to be built elsewhere.
     """
@@ -226,10 +197,68 @@ def to_library(
         compiler=compiler,
         overwrite=force,
     )
-    _say_left_out(console, thing, done.sources, no_field=no_field)
+    _say_left_out(console, thing, no_field=no_field)
     whole = replace(done.sources, files=done.files, comparison=done.comparison)
     missing = f"{_NO_COMPILER}: build the library with CMake, -DBUILD_SHARED_LIBS=ON"
     _print(console, whole, done.files, missing, no_check=no_check)
+
+
+@export_app.command("unity")
+def to_unity(
+    file: BodyFile,
+    out: Folder = None,
+    name: Annotated[str | None, typer.Option(help="Name of the package. Default: the file's name.")] = None,
+    no_check: NoCheck = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write a package of Unity: a component, a sample, the mesh at rest, and a library for three systems.
+
+    Nothing is compiled. The library is compared with palpate at 1,000 places; one that differs is refused.
+    """
+    from palpate.export import export_unity
+
+    console = Console(as_json)
+    done = export_unity(
+        _body(file),
+        file.with_name(f"{name or file.stem}-unity") if out is None else out,
+        name=name or _name_of(file),
+        check=not no_check,
+        overwrite=force,
+    )
+    _print(console, done, done.files, "there is no library for this machine", no_check=no_check)
+    console.say(
+        f"Next: in Unity, Package Manager > + > Install package from disk: {done.folder / 'package.json'}"
+    )
+
+
+@export_app.command("unreal")
+def to_unreal(
+    file: BodyFile,
+    out: Folder = None,
+    name: Name = None,
+    no_check: NoCheck = False,
+    compiler: Compiler = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write a plugin of Unreal: a component, the mesh at rest, and sources in C for any platform.
+
+    If there is a C compiler the sources are compared with palpate at 1,000 places; those that differ are refused.
+    """
+    from palpate.export import export_unreal
+
+    console = Console(as_json)
+    done = export_unreal(
+        _body(file),
+        file.with_name(f"{name or file.stem}-unreal") if out is None else out,
+        name=name or _name_of(file),
+        check=not no_check,
+        compiler=compiler,
+        overwrite=force,
+    )
+    _print(console, done, done.files, _NO_COMPILER, no_check=no_check)
+    console.say(f"Next: copy {done.folder} into the folder Plugins of a project of Unreal in C++")
 
 
 @export_app.command("fmu")
@@ -316,7 +345,9 @@ def to_onnx(
 
     console = Console(as_json)
     path = file.with_suffix(".onnx") if out is None else out
-    done = export_onnx(_read(file), path, single=single, elastic=elastic, check=not no_check, overwrite=force)
+    done = export_onnx(
+        _surrogate(file), path, single=single, elastic=elastic, check=not no_check, overwrite=force
+    )
     missing = _NOT_INSTALLED.format("ONNX Runtime", "onnx")
     _print(console, done, [done.file], missing, no_check=no_check)
 
@@ -333,18 +364,14 @@ def to_html(
     as_json: Json = False,
 ) -> None:
     """Write one HTML file with the model in it, touched or asked in any browser: from disk, without a network."""
-    from palpate.learning.loading import load
-    from palpate.surrogates import Surrogate
     from palpate.viewer.file_page import export_html
 
-    loaded, console = load(file), Console(as_json)
-    answers = isinstance(loaded, Surrogate) and not loaded.can_be_touched
-    thing = loaded if isinstance(loaded, Surrogate) and answers else _body(file)
+    thing, console = _surrogate(file), Console(as_json)
     # NAME.html is the report of `palpate validate`
     path = file.with_name(f"{file.stem}-page.html") if out is None else out
     done = export_html(thing, path, check=not no_check, overwrite=force)
     if done.left_out:
         console.say(f"not in the file: {', '.join(done.left_out)} (5 MB are full, or it is on other nodes)")
     missing = _NOT_INSTALLED.format("wasmtime", "check")
-    missing = "the page computes its answers by itself" if answers else missing
+    missing = missing if thing.can_be_touched else "the page computes its answers by itself"
     _print(console, done, [done.file], missing, no_check=no_check)

@@ -26,12 +26,16 @@ def improve_file(
     options: ImprovementOptions,
     scheduler: Scheduler | None,
     console: Console,
+    *,
+    refine: bool = False,
 ) -> None:
     """Choose the solves of a study file until a force error, such as "2%", is kept, and print where everything is.
 
+    With `refine` finer solves decide the elements' size first.
     They are solved on a running scheduler, where there is one. Everything has been kept and printed when an
     `AccuracyError` says that the force error was not reached.
     """
+    from palpate.cli.study_commands import refine_elements
     from palpate.study import read_study
     from palpate.study.run import Paths
     from palpate.study.study_lock import hold_study
@@ -40,6 +44,8 @@ def improve_file(
         record = read_study(file).with_workers(options.workers)
     paths = Paths(file.parent, record.name)
     with hold_study(paths, "palpate sweep"):
+        if refine:
+            record = refine_elements(record, file, console, workers=options.workers, scheduler=scheduler)
         outcome, content, failure = improve_and_print(record, paths, options, console, cluster=scheduler)
     lines = [] if failure is not None else [content["reason"]]  # which the error says too
     lines.append(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import statistics
 import time
 from dataclasses import replace
@@ -27,6 +28,7 @@ __all__ = [
     "learn_dataset_file",
     "learn_file",
     "learn_path",
+    "refine_elements",
     "sweep_file",
     "validate_model",
     "validate_study_file",
@@ -48,13 +50,14 @@ def sweep_file(
     *,
     case_limit: float = CASE_LIMIT,
     samples: int | None = None,
+    refine: bool = False,
 ) -> None:
     """Solve what a study file describes, here or on a scheduler, and print where the solves are.
 
     The workers are by default those of the study; a single solve has failed after `case_limit` seconds. `samples` go in
-    place of the study's own number; a finished sweep is continued.
+    place of the study's own number; a finished sweep is continued. With `refine` finer solves decide the elements' size
+    first.
     """
-    from palpate.dataset import Dataset
     from palpate.study import read_study
     from palpate.study.run import Paths, sweep_study
     from palpate.study.study_lock import hold_study
@@ -76,6 +79,8 @@ def sweep_file(
     if scheduler is not None and scheduler.warning:
         console.say(f"Warning: {scheduler.warning}")
     with hold_study(paths, "palpate sweep"):
+        if refine:
+            record = refine_elements(record, study, console, workers=workers, scheduler=scheduler)
         data, further = sweep_study(
             record,
             paths,
@@ -84,18 +89,15 @@ def sweep_file(
             case_limit=case_limit,
             log=lambda stage: console.say(f"Solving: {stage} …"),
         )
-    target, other = (
-        (paths.data, paths.random) if record.memory is None else (paths.histories, paths.unseen_histories)
-    )
+    target, other = paths.data, paths.random
     parts = [data] if further is None else [data, further]
-    failed = sum(len(part) - len(part.ok) for part in parts if hasattr(part, "ok"))
-    what = "solves" if record.memory is None else "histories"
+    failed = sum(len(part) - len(part.ok) for part in parts)
     failures = f", {failed} did not converge" if failed else ""
     lines = [str(data)] if console.verbose else []
-    lines.append(f"{target}: {len(data)} {what} to learn from{failures}")
+    lines.append(f"{target}: {data.size_in_words} to learn from{failures}")
     if further is not None:
-        lines.append(f"{other}: {len(further)} further {what} for testing")
-    seconds = [float(s) for part in parts if isinstance(part, Dataset) for s in part["solve_seconds"]]
+        lines.append(f"{other}: {further.size_in_words} for testing")
+    seconds = [float(s) for part in parts for s in part["solve_seconds"]]
     if seconds:
         lines.append(
             f"{count(len(seconds), 'solve')}, {duration(statistics.median(seconds))} each at the median; "
@@ -104,6 +106,36 @@ def sweep_file(
     lines.append(f"next    palpate learn {study}")
     content = {"data": str(target), "random": None if further is None else str(other)}
     console.result("\n".join(lines), content | {"rows": sum(map(len, parts)), "failed": failed})
+
+
+def refine_elements(
+    study: Study,
+    file: Path,
+    console: Console,
+    *,
+    workers: int | None = None,
+    scheduler: Scheduler | None = None,
+) -> Study:
+    """Return a study with elements of the size that finer solves choose, as its file says it afterwards.
+
+    A study that has solves keeps its elements.
+    """
+    from palpate.study.mesh_check import refine_study
+    from palpate.study.run import Paths
+    from palpate.sweeps import local_cluster
+
+    if Paths(file.parent, study.name).data.exists():
+        console.say("Its solves are there already, and their elements stay as they are.")
+        return study
+    with contextlib.ExitStack() as stack:
+        cluster = stack.enter_context(local_cluster(workers)) if scheduler is None else scheduler
+        return refine_study(
+            study,
+            file,
+            cluster=cluster,
+            progress=not console.as_json,
+            log=lambda stage: console.say(f"{stage} …"),
+        )
 
 
 def learn_path(
@@ -152,7 +184,7 @@ def learn_file(study: Path, console: Console, *, watch: bool = False, leave_out:
     page = paths.folder / f"{record.name}.growth.html" if watch else None
     with hold_study(paths, "palpate learn"):
         train, test = load_data(record, paths)
-        console.say(f"Learning from {len(train)} {'solves' if record.memory is None else 'histories'} …")
+        console.say(f"Learning from {train.size_in_words} …")
         with watch_growth(page, record.name, console) as recorder, console.patience("Learning"):
             model, history = learn_study(
                 record,
@@ -249,7 +281,7 @@ def learn_dataset_file(path: Path, effort: float, console: Console, leave_out: S
     from palpate.learning import learn_dataset
 
     data = Dataset.open(path)
-    console.say(f"Learning from {len(data.ok)} solves …")
+    console.say(f"Learning from {data.ok.size_in_words} …")
     model, history = learn_dataset(
         data,
         name=path.stem,
@@ -314,7 +346,7 @@ def validate_model(
 def _test_set(path: Path, test: Path | None) -> Any:
     """Return the dataset, or for a body with memory the load histories, that lies beside a model or was named."""
     from palpate.dataset import Dataset
-    from palpate.learning.plastic import LoadHistories
+    from palpate.learning.loading import load_histories
 
     beside = [path.with_name(path.stem + end) for end in TEST_SETS]
     found = test or next((file for file in beside if file.exists()), None)
@@ -324,4 +356,4 @@ def _test_set(path: Path, test: Path | None) -> Any:
             why=f"None of {', '.join(file.name for file in beside)} lies beside it.",
             fix="Name a dataset of solves that it was not learnt from: --test DATA.zarr",
         )
-    return LoadHistories.load(found) if found.suffix == ".palpate" else Dataset.open(found)
+    return load_histories(found) if found.suffix == ".palpate" else Dataset.open(found)

@@ -35,14 +35,23 @@ def sweep(
         declared_option(
             ImprovementOptions,
             "until",
-            "For a body under a probe: choose solves where the force is least certain, and learn, until this force "
-            "error is kept at the 95th percentile of unseen solves, such as 2%.",
+            "Choose solves where the answers are least certain, and learn, until this error is kept at the 95th "
+            "percentile of unseen solves, such as 2%: of the force of a body under a probe, or of numbers and fields "
+            "over their range.",
         ),
     ] = None,
     minutes: Annotated[
         float | None,
         number_option(
             "--minutes", least=0, help="With --until: minutes after which no further batch begins."
+        ),
+    ] = None,
+    element: Annotated[
+        str | None,
+        typer.Option(
+            metavar="auto",
+            help="For a body under a probe, auto: three touches on two meshes decide the size of the elements, which "
+            "the file then states. Default: the file's own.",
         ),
     ] = None,
     workers: Annotated[
@@ -77,37 +86,48 @@ def sweep(
     A study with a table *solver* runs the program that it names, once for each case; the command is printed first.
     """
     from palpate.cli.study_commands import sweep_file
+    from palpate.study.part_study import AUTO
     from palpate.study.solver_study import says_solver
     from palpate.sweeps import Scheduler
 
-    if says_solver(study):
-        from palpate.cli.solver_sweep_command import SolverSweepOptions, sweep_solver_file
-
-        chosen = until is not None or minutes is not None
-        elsewhere = any(option is not None for option in (scheduler, tls_ca, tls_cert, tls_key))
-        wishes = SolverSweepOptions(samples, workers, case_limit, chosen, elsewhere)
-        sweep_solver_file(study, wishes, Console(as_json, verbose))
-        return
+    if element not in {None, AUTO}:
+        raise UsageError(
+            f"--element {element} asks a sweep for elements of a size.",
+            why="The study file states the size of its elements; only auto lets touches on two meshes decide it.",
+            fix=f"Write it there, [sweep] element, or give --element {AUTO}.",
+        )
     if scheduler is not None:
         own = Scheduler(scheduler, tls_ca, tls_cert, tls_key)
     elif tls_ca or tls_cert or tls_key:
         raise UsageError("Certificates belong to a scheduler.", fix="Give its address with --scheduler.")
     else:
         own = None
-    if until is not None:
-        from palpate.cli.improvement_lines import improve_file
-
-        options = ImprovementOptions(
-            until=until,
-            limit=math.inf if minutes is None else 60.0 * minutes,
-            most=samples or ImprovementOptions.most,
-            workers=workers,
-            case_limit=case_limit,
-        )
-        improve_file(study, options, own, Console(as_json, verbose))
-        return
-    if minutes is not None:
+    if until is None and minutes is not None:
         raise UsageError(
             "A sweep of a design has no limit on time.", fix="Give --until, or leave --minutes out."
         )
-    sweep_file(study, workers, Console(as_json, verbose), own, case_limit=case_limit, samples=samples)
+    options = None
+    if until is not None:
+        limit = math.inf if minutes is None else 60.0 * minutes
+        most = samples or ImprovementOptions.most
+        options = ImprovementOptions(
+            until=until, limit=limit, most=most, workers=workers, case_limit=case_limit
+        )
+    refine = element is not None
+    if says_solver(study):
+        from palpate.cli.solver_sweep_command import SolverSweepOptions, sweep_solver_file
+
+        if refine:
+            raise UsageError(
+                "The program of a study with [solver] makes its own mesh.", fix="Leave --element out."
+            )
+        wishes = SolverSweepOptions(samples, workers, case_limit, own, options)
+        sweep_solver_file(study, wishes, Console(as_json, verbose))
+        return
+    console = Console(as_json, verbose)
+    if options is not None:
+        from palpate.cli.improvement_lines import improve_file
+
+        improve_file(study, options, own, console, refine=refine)
+        return
+    sweep_file(study, workers, console, own, case_limit=case_limit, samples=samples, refine=refine)

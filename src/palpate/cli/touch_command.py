@@ -121,12 +121,13 @@ def _touch_without_page(
     part: Path, choices: PartOptions, options: ImprovementOptions, console: Console
 ) -> None:
     """Improve the study of a part, and print each surrogate."""
+    from palpate.cli.study_commands import refine_elements
     from palpate.study.part_study import AUTO, study_file
     from palpate.study.run import Paths
 
     study = _study_of(part, choices, console)
     if choices.element == AUTO:
-        study = _refine(study, study_file(part, choices.name), options.workers, console)
+        study = refine_elements(study, study_file(part, choices.name), console, workers=options.workers)
     _carry_on(study.with_workers(options.workers), Paths(part.parent, study.name), options, console)
 
 
@@ -202,25 +203,6 @@ def _study_of(part: Path, choices: PartOptions, console: Console) -> Study:
     console.say("\n".join(filter(None, notes)))
     console.say(f"{chosen_words(study)} {file} says all of it; change it there.")
     return study
-
-
-def _refine(study: Study, file: Path, workers: int | None, console: Console) -> Study:
-    """Return the study of a part with elements that finer solves have chosen; one with solves keeps its elements."""
-    from palpate.study.mesh_check import refine_study
-    from palpate.study.run import Paths
-
-    if Paths(file.parent, study.name).data.exists():
-        return study
-    from palpate.sweeps import local_cluster
-
-    with local_cluster(workers) as cluster:
-        return refine_study(
-            study,
-            file,
-            cluster=cluster,
-            progress=not console.as_json,
-            log=lambda stage: console.say(f"{stage} …"),
-        )
 
 
 def _require_part(study: Study, file: Path, part: Path) -> None:

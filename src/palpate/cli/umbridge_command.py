@@ -24,9 +24,9 @@ def serve_umbridge(
 ) -> None:
     """Serve a model to UM-Bridge clients: value, gradient, Jacobian and Hessian, on this machine only, until Ctrl-C."""
     from palpate.export.umbridge_server import HOST, UMBridgeServer, served_models
-    from palpate.learning.loading import load
+    from palpate.learning.loading import load_surrogate
 
-    models = served_models(load(file))
+    models = served_models(load_surrogate(file))
     try:
         server = UMBridgeServer(models, port)
     except (OSError, OverflowError) as error:

@@ -6,6 +6,7 @@
     schema.py    Field, Layout: the quantities that a solver answers, and the nodes that they belong to
     carried_surface.py  a body's own surface at full detail, bound to the elements on which solves are known
     assemble.py  inputs and answers, labelled and joined into a dataset
+    histories.py  samples of histories, for a body with memory
     store.py     a dataset on disk, with a checksum
     dataset_tables.py  the same as CSV, Parquet and netCDF, for other tools
     measured/    forces measured on a specimen: text tables, and lines from a sensor
@@ -13,6 +14,7 @@
 
 from palpate.dataset.assemble import assemble
 from palpate.dataset.dataset import Dataset
+from palpate.dataset.histories import LoadHistory, histories_of, is_history
 from palpate.dataset.schema import (
     BOOKKEEPING,
     Field,
@@ -29,10 +31,13 @@ __all__ = [
     "Dataset",
     "Field",
     "Layout",
+    "LoadHistory",
     "assemble",
     "beam_fields",
     "check_schema",
     "conjugate_unit",
+    "histories_of",
+    "is_history",
     "solid_fields",
     "with_bookkeeping",
 ]

@@ -15,6 +15,7 @@ import numpy as np
 from palpate.dataset import store
 from palpate.dataset.schema import BOOKKEEPING, TIMINGS
 from palpate.errors import UsageError
+from palpate.format import count as count_of
 from palpate.format import share
 from palpate.units import Range
 
@@ -127,6 +128,15 @@ class Dataset:
         return int(self.data.sizes["sample"])
 
     @property
+    def size_in_words(self) -> str:
+        """The number of solves, or of histories with their samples."""
+        if "history" not in self:
+            return count_of(len(self), "solve")
+        owners = self["history"]
+        histories = count_of(len(np.unique(owners[owners >= 0])), "history", "histories")
+        return f"{histories} with {count_of(int((owners >= 0).sum()), 'sample')}"
+
+    @property
     def ok(self) -> Dataset:
         """The rows that converged."""
         return self.take(np.flatnonzero(self.converged))
@@ -185,15 +195,19 @@ class Dataset:
             If `test` is no share, or fewer than two rows converged.
         """
         rows = np.flatnonzero(self.converged)
-        if not 0 < test < 1 or rows.size < 2:
+        # the samples of a history stay together, and a body without its memory is there to learn from
+        owners = self["history"][rows] if "history" in self else rows
+        parts = np.unique(owners[owners >= 0])
+        if not 0 < test < 1 or parts.size < 2:
             raise UsageError(
-                f"{rows.size} converged rows can't be split with {test} of them for the test.",
+                f"{parts.size} converged rows can't be split with {test} of them for the test.",
                 why="The share is between 0 and 1, and each part needs at least one row.",
                 fix="Choose a share such as 0.25, or sweep more samples.",
             )
-        count = int(np.clip(round(test * rows.size), 1, rows.size - 1))
-        shuffled = np.random.default_rng(seed).permutation(rows)
-        return self.take(np.sort(shuffled[count:])), self.take(np.sort(shuffled[:count]))
+        count = int(np.clip(round(test * parts.size), 1, parts.size - 1))
+        shuffled = np.random.default_rng(seed).permutation(parts)
+        learnt, held_out = np.isin(owners, shuffled[:count], invert=True), np.isin(owners, shuffled[:count])
+        return self.take(rows[learnt]), self.take(rows[held_out])
 
     # ---- arrays by name ----
 
@@ -344,7 +358,7 @@ class Dataset:
         outcome = f"{failed} did not converge" if failed else "all converged"
         kind = self.provenance.get("problem", {}).get("body", {}).get("type", "a body")
         strain = self.largest_strain[np.isfinite(self.largest_strain)]
-        lines = [f"Dataset of {len(self)} solves of {self.provenance.get('words') or kind}, {outcome}"]
+        lines = [f"Dataset of {self.size_in_words} of {self.provenance.get('words') or kind}, {outcome}"]
         lines += [f"  input   {r}" for r in self.ranges]
         lines += [f"  answers {', '.join(self._answer_names())}"]
         if strain.size:

@@ -11,6 +11,9 @@ check_answers   how far these are from palpate
 check_program   a compiled export that answers them
 c_export        `palpate export c`: write, compile and compare
 lib_export      `palpate export lib`: a shared library, with wrappers for other programs
+unity_export    `palpate export unity`: a package with the generic library, which check_engine asks
+unreal_export   `palpate export unreal`: a plugin with the sources in C
+engine_scene    what a scene of either needs to know; package_folder writes their folders
 check_library   a library that answers through its Python wrapper
 fmu_export      `palpate export fmu`: description, weights and the binaries of fmu_binaries, which read them
 carried_mass    a mass at the tip of a body, which an FMU moves
@@ -27,6 +30,9 @@ from palpate.export.c_export import ExportedC, export_c
 from palpate.export.carried_mass import CarriedMass
 from palpate.export.fmu_export import ExportedFmu, export_fmu
 from palpate.export.lib_export import ExportedLibrary, export_lib
+from palpate.export.package_folder import ExportedPackage
+from palpate.export.unity_export import export_unity
+from palpate.export.unreal_export import export_unreal
 from palpate.export.weights_block import WeightsBlock
 
 __all__ = [
@@ -35,8 +41,11 @@ __all__ = [
     "ExportedC",
     "ExportedFmu",
     "ExportedLibrary",
+    "ExportedPackage",
     "WeightsBlock",
     "export_c",
     "export_fmu",
     "export_lib",
+    "export_unity",
+    "export_unreal",
 ]

@@ -23,7 +23,7 @@ from palpate.network import Network, Scaling, TrainedRegion
 from palpate.surrogates import LearntQuantities, ModalField, Surrogate
 from palpate.units import Quantity, Range
 
-__all__ = ["AnswerNetwork", "Choice", "answer_network", "answers_of", "whole_answers"]
+__all__ = ["AnswerNetwork", "Choice", "answer_network", "answers_of"]
 
 
 @dataclass(frozen=True)
@@ -125,23 +125,18 @@ class _Rows:
     matrix: np.ndarray
 
 
-def answers_of(thing: Surrogate | Network) -> AnswerNetwork | None:
-    """Return what a network, or a surrogate that no hand feels, answers as a whole; None of a touched body."""
-    if isinstance(thing, Network):
-        return AnswerNetwork("network", (thing,), (), (), (len(thing.outputs),))
-    return None if thing.can_be_touched else whole_answers(thing)
-
-
-def whole_answers(surrogate: Surrogate) -> AnswerNetwork:
-    """Return all numbers, and all values of all fields and curves; an error where there are none."""
+def answers_of(surrogate: Surrogate) -> AnswerNetwork | None:
+    """Return all numbers, fields and curves of a surrogate that no hand feels; None of a touched body."""
+    if surrogate.can_be_touched:
+        return None
     rows = [*_numbers(surrogate)]
-    rows += [_values(shown, range(len(shown.places))) for shown in _modal_fields(surrogate)]
+    rows += [_values(shown, range(len(shown.places))) for shown in surrogate.modal_fields.values()]
     return _assemble(surrogate, rows, ())
 
 
 def answer_network(surrogate: Surrogate, choice: Choice) -> AnswerNetwork:
     """Return all numbers and curves, and the chosen values of fields; an error where a field or place is not there."""
-    fields = {shown.name: shown for shown in _modal_fields(surrogate)}
+    fields = {shown.name: shown for shown in surrogate.modal_fields.values()}
     flat = {name: shown for name, shown in fields.items() if not shown.is_curve}
     _require_fields(surrogate, flat, choice)
     means = tuple(flat) if choice.is_default else choice.means
@@ -171,10 +166,6 @@ def _assemble(
     networks = _join([*rows, *hidden])
     groups = tuple(len(row.outputs) for row in rows)
     return AnswerNetwork(surrogate.name, networks, runs, _regions([*rows, *hidden]), groups)
-
-
-def _modal_fields(surrogate: Surrogate) -> list[ModalField]:
-    return [shown for shown in surrogate.fields.values() if isinstance(shown, ModalField)]
 
 
 def _require_fields(surrogate: Surrogate, flat: dict[str, ModalField], choice: Choice) -> None:
@@ -258,11 +249,11 @@ def _join(rows: Sequence[_Rows]) -> tuple[Network, ...]:
     if any(
         not np.array_equal(getattr(other, ends), getattr(scalings[0], ends))
         for other in scalings
-        for ends in ("input_centre", "input_half")
+        for ends in ("input_centre", "input_half", "input_bend")
     ):
         raise UsageError(
             "The parts of this surrogate can't go out together.",
-            why="They have other ranges of the inputs.",
+            why="They have other ranges or scales of the inputs.",
             fix="Learn all parts together, from one dataset.",
         )
     kinds = list(dict.fromkeys(part.network.radial for part in parts))
@@ -289,7 +280,8 @@ def _of_one_kind(rows: Sequence[_Rows], parts: Sequence[LearntQuantities]) -> Ne
     modes_of_outputs: np.ndarray | None = basis
     if count <= starts[-1]:  # sums of latent outputs are less work than these themselves
         weights, tail, modes_of_outputs = basis @ weights, basis @ tail, None
-    scaling = Scaling(first.scaling.input_centre, first.scaling.input_half, centre, np.ones(count))
+    outer = first.scaling
+    scaling = Scaling(outer.input_centre, outer.input_half, centre, np.ones(count), outer.input_bend)
     names = tuple(quantity for row in rows for quantity in row.outputs)
     return Network(
         first.inputs, names, factors, shifts, weights, tail, scaling, {}, first.radial, modes_of_outputs

@@ -22,8 +22,8 @@ def series_of_answers(surrogate: Surrogate, X: np.ndarray, field: str | None = N
     """
     drawn = {
         name: shown
-        for name, shown in surrogate.fields.items()
-        if isinstance(shown, ModalField) and _has_surface(shown)
+        for name, shown in surrogate.modal_fields.items()
+        if shown.mesh is not None and shown.mesh.is_surface
     }
     if not drawn or (field is not None and field not in drawn):
         raise UsageError(
@@ -32,8 +32,8 @@ def series_of_answers(surrogate: Surrogate, X: np.ndarray, field: str | None = N
             fix="Choose one of these, or take its numbers and curves with `palpate ask FILE --table …`.",
         )
     shown = drawn[field or next(iter(drawn))]
-    places = shown.places
-    assert isinstance(places, MeshPlaces)
+    assert shown.mesh is not None
+    places = shown.mesh
     points, triangles, values = places.points, places.triangles, np.linalg.norm(shown.values(X), axis=2)
     if max(1, len(shown.components)) == 1:
         values = shown.values(X)[..., 0]
@@ -61,20 +61,11 @@ def series_of_answers(surrogate: Surrogate, X: np.ndarray, field: str | None = N
     )
 
 
-def _has_surface(shown: ModalField) -> bool:
-    """Return whether a field can be drawn."""
-    if not isinstance(shown.places, MeshPlaces):
-        return False
-    return bool(len(shown.places.triangles)) and (
-        shown.places.kind == "nodes" or len(shown.places.cell_of) > 0
-    )
-
-
 def _moves(shown: ModalField, places: MeshPlaces) -> bool:
     """Return whether a field is a displacement of the nodes of a mesh."""
-    own = shown.places
+    own = shown.mesh
     return (
-        isinstance(own, MeshPlaces)
+        own is not None
         and own.kind == "nodes"
         and shown.unit == "m"
         and len(shown.components) in {2, 3}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from palpate.export.answer_network import AnswerNetwork, answers_of
+from palpate.export.answer_network import answers_of
 from palpate.export.c_files import c_files, require_name
 from palpate.export.check_answers import compare_answers
 from palpate.export.check_points import Comparison, Precision, compare_body
@@ -117,10 +117,11 @@ def export_c(
     AccuracyError
         If the compiled files differ from palpate by more than they may; nothing is written.
     """
-    name = require_name(identifier(_default_name(thing)) if name is None else name)
-    block = block_of(thing, field=field, with_field=with_field, deviation=deviation)
-    texts = c_files(_sources(thing), block, name, single=single)
-    card = card_of(thing).with_hash(block.label, block.hash)
+    surrogate = Surrogate.of(thing)
+    name = require_name(identifier(surrogate.name) if name is None else name)
+    block = block_of(surrogate, field=field, with_field=with_field, deviation=deviation)
+    texts = c_files(surrogate, answers_of(surrogate), block, name, single=single)
+    card = card_of(surrogate).with_hash(block.label, block.hash)
     texts |= {f"{name}_card.md": card.to_markdown(), f"{name}_card.json": card.to_json()}
     folder = Path(out)
     require_outputs((folder / file for file in texts), folder=folder, overwrite=overwrite)
@@ -128,7 +129,7 @@ def export_c(
     if path is not None:
         with tempfile.TemporaryDirectory() as place:
             tried = ExportedC(_write(Path(place), texts), name, block.hash, block.field, None)
-            comparison = compare_c(thing, block, tried, path, single=single)
+            comparison = compare_c(surrogate, block, tried, path, single=single)
         why = (
             "Single precision is too coarse for this body."
             if single
@@ -145,20 +146,16 @@ def _write(folder: Path, texts: dict[str, str]) -> tuple[Path, ...]:
     return tuple(write_file(folder / file, with_seal(file, text)) for file, text in texts.items())
 
 
-def block_of(
-    thing: Surrogate | Network, *, field: str | None, with_field: bool, deviation: bool
-) -> WeightsBlock:
-    """Return the weights of a body or of a network; an error where a part of it has no C source."""
-    if isinstance(thing, Network):
-        return WeightsBlock.of_network(thing)
-    if (answers := answers_of(thing)) is not None:
+def block_of(surrogate: Surrogate, *, field: str | None, with_field: bool, deviation: bool) -> WeightsBlock:
+    """Return the weights of a surrogate; an error where a part of it has no C source."""
+    if (answers := answers_of(surrogate)) is not None:
         return WeightsBlock.of_answers(answers)
-    chosen = chosen_field(thing, field) if with_field else None
-    return WeightsBlock.of(thing, field=chosen, deviation=deviation)
+    chosen = chosen_field(surrogate, field) if with_field else None
+    return WeightsBlock.of(surrogate, field=chosen, deviation=deviation)
 
 
 def compare_c(
-    thing: Surrogate | Network,
+    surrogate: Surrogate,
     block: WeightsBlock,
     done: ExportedC,
     compiler: str,
@@ -169,13 +166,12 @@ def compare_c(
     """Compile exported files and compare them with palpate."""
     precision = Precision(single)
     with tempfile.TemporaryDirectory() as folder:
-        if (answers := answers_of(thing)) is not None:
+        if (answers := answers_of(surrogate)) is not None:
             program = CheckProgram.compile(
                 compiler, done.sources, done.name, Path(folder), network=True, options=options
             )
             return compare_answers(answers, lambda X: program.replies(X, len(answers.outputs)), precision)
-        assert isinstance(thing, Surrogate)
-        nodes = thing.fields[block.field].rest.shape if block.field else (0, 0)  # type: ignore[union-attr]
+        nodes = surrogate.surface_fields[block.field].rest.shape if block.field else (0, 0)
         program = CheckProgram.compile(
             compiler,
             done.sources,
@@ -186,17 +182,4 @@ def compare_c(
             options=options,
         )
         known = ROOT in block.tables
-        return compare_body(thing, program, precision, field=block.field, deviation=known)
-
-
-def _sources(thing: Surrogate | Network) -> Surrogate | AnswerNetwork:
-    """Return what the C files are of: the answers, or a body that a hand feels."""
-    answers = answers_of(thing)
-    if answers is None:
-        assert isinstance(thing, Surrogate)
-        return thing
-    return answers
-
-
-def _default_name(thing: Surrogate | Network) -> str:
-    return thing.name if isinstance(thing, Surrogate) else "network"
+        return compare_body(surrogate, program, precision, field=block.field, deviation=known)

@@ -61,21 +61,24 @@ class _Facts:
 
 
 def c_files(
-    thing: Surrogate | AnswerNetwork, block: WeightsBlock, name: str, *, single: bool
+    surrogate: Surrogate, answers: AnswerNetwork | None, block: WeightsBlock, name: str, *, single: bool
 ) -> dict[str, str]:
-    """Return the texts of all files by their names; `name` begins all names in C, `single` gives 32-bit numbers."""
+    """Return the texts of all files by their names; `name` begins all names in C, `single` gives 32-bit numbers.
+
+    `answers` are those of a surrogate that no hand feels.
+    """
     outputs: tuple[Quantity, ...] = ()
-    felt, title, parts = 0, str(thing), ["NETWORK"]
-    if isinstance(thing, AnswerNetwork):
-        outputs = thing.outputs
+    felt, title, parts = 0, str(surrogate), ["NETWORK"]
+    if answers is not None:
+        outputs, title = answers.outputs, str(answers)
     else:
-        felt, title = len(thing.hand_energy.baseline.directions), title.splitlines()[0]
+        felt, title = len(surrogate.hand_energy.baseline.directions), title.splitlines()[0]
         has = {"BODY": True, "MEMORY": block.memory, "RELEASE": block.releases, "FIELD": block.field}
         parts = [part for part, there in has.items() if there]
-    facts = _Facts(name, single, block, title, thing.inputs, outputs, felt)
-    words = _words(facts, thing)
+    facts = _Facts(name, single, block, title, surrogate.inputs, outputs, felt)
+    words = _words(facts, surrogate)
     files = {
-        f"{name}.h": _head(facts, _notes(facts, thing)) + fill_template("api.h", words, parts),
+        f"{name}.h": _head(facts, _notes(facts, surrogate)) + fill_template("api.h", words, parts),
         f"{name}.c": _source(facts) + fill_template("api.c", words, parts),
     }
     if block.field:
@@ -86,12 +89,12 @@ def c_files(
     return files
 
 
-def _words(facts: _Facts, thing: Surrogate | AnswerNetwork) -> dict[str, str]:
+def _words(facts: _Facts, surrogate: Surrogate) -> dict[str, str]:
     """Return what stands in the files for the words of the templates."""
     sizes, along = [len(facts.inputs)], ""
-    if isinstance(thing, Surrogate):
-        sizes = list(body_sizes(thing, facts.block))
-        along = ", ".join(_braces_around(row, facts) for row in thing.hand_energy.baseline.directions)
+    if surrogate.can_be_touched:
+        sizes = list(body_sizes(surrogate, facts.block))
+        along = ", ".join(_braces_around(row, facts) for row in surrogate.hand_energy.baseline.directions)
     places = ("INPUTS", "FELT", "PARAMETERS", "WORK", "STATE", "SHAPE", "NODES", "COMPONENTS")
     middle = [_number((r.low + r.high) / 2, single=facts.single) for r in facts.inputs[facts.felt :]]
     return {
@@ -181,11 +184,11 @@ def _thousands(count: int) -> str:
     return f"{count / 1e3:.2g}" if count < 1e5 else f"{count / 1e3:.0f}"
 
 
-def _notes(facts: _Facts, thing: Surrogate | AnswerNetwork) -> list[str]:
+def _notes(facts: _Facts, surrogate: Surrogate) -> list[str]:
     """Return what the header tells of the arguments of its functions."""
-    if isinstance(thing, AnswerNetwork):
+    if not surrogate.can_be_touched:
         return ["", *(f"output {i}: {q.name} {q.unit}".rstrip() for i, q in enumerate(facts.outputs[:50]))]
-    holds = thing.hand_energy.baseline.holds
+    holds = surrogate.hand_energy.baseline.holds
     x = "displacement of what the hand holds from its rest" if holds else "centre of the probe"
     return ["", f"x (3) is the {x}, m; p are the inputs after the first {facts.felt}, in their units."]
 

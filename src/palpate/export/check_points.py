@@ -11,7 +11,7 @@ deviation of the force, which goes out in single precision, too.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -36,7 +36,6 @@ __all__ = [
     "Releaser",
     "compare_body",
     "compare_field",
-    "compare_network",
     "compare_rest",
     "condition",
     "difference",
@@ -248,33 +247,7 @@ def compare_body(
     if surrogate.memory is not None:
         parts |= _stroke(surrogate, asker, precision)
     if field:
-        shown = surrogate.fields[field]
-        assert isinstance(shown, FieldSurrogate)
-        parts["field"] = compare_field(surrogate, shown, asker, precision)
-    return Comparison(parts, precision.single)
-
-
-def compare_network(
-    network: Network,
-    ask: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray | None]],
-    precision: Precision | None = None,
-) -> Comparison:
-    """Return how far an exported network is from palpate at 1,000 inputs, with its derivatives; by default in double.
-
-    `ask` takes inputs (N, n) and returns outputs (N, m) and derivatives (N, m, n), None where it has none.
-    """
-    precision = precision or Precision()
-    low, high = bounds(network.inputs)
-    X = np.random.default_rng(0).uniform(
-        low - 0.3 * (high - low), high + 0.3 * (high - low), (1000, len(low))
-    )
-    Y, J = ask(X)
-    limit = tolerances(network, X, precision)
-    parts = {"outputs": difference(network.predict(X), Y, limit)}
-    if J is not None:
-        slopes = np.stack([network.jacobian(x) for x in X]) * (high - low)
-        rates = (J * (high - low)).reshape(len(X), -1)
-        parts["derivatives"] = difference(slopes.reshape(len(X), -1), rates, limit)
+        parts["field"] = compare_field(surrogate, surrogate.surface_fields[field], asker, precision)
     return Comparison(parts, precision.single)
 
 

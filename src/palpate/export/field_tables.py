@@ -108,7 +108,7 @@ def chosen_field(surrogate: Surrogate, name: str | None) -> str | None:
             fix="Name one of these, or leave the field out.",
         )
     if name is None:
-        shown = [k for k, v in surrogate.fields.items() if isinstance(v, FieldSurrogate)]
+        shown = surrogate.surface_fields
         name = "displacement" if "displacement" in shown else next(iter(shown), None)
     return name
 
@@ -118,8 +118,8 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
 
     The core does not know fields at the nodes of a bent body.
     """
-    shown = surrogate.fields[name]
-    if not isinstance(shown, FieldSurrogate):
+    shown = surrogate.surface_fields.get(name)
+    if shown is None:
         raise UsageError(
             f"The field {name!r} is one at the nodes of a bent body, and the evaluator core knows fields on surfaces.",
             fix="Export the body without a field; its force and energy are the same.",

@@ -1,4 +1,6 @@
-"""The generic binaries of FMUs: one for each platform and both versions of FMI, kept with the package.
+"""The generic binaries, kept with the package: those of FMUs, and the library of a scene's engine.
+
+One of each for every platform reads any body's weights; those of FMUs serve both versions of FMI.
 
     .ci/build_fmu_binaries [--check]
 
@@ -22,7 +24,7 @@ from pathlib import Path
 from palpate.errors import ResourceError
 from palpate.export.core_source import generic_source
 
-__all__ = ["build_binaries", "built_binaries", "fmu_source", "main"]
+__all__ = ["build_binaries", "built_binaries", "engine_libraries", "fmu_source", "main"]
 
 _SOURCES = (
     "memory_states.c",
@@ -37,6 +39,7 @@ _SOURCES = (
     "fmi2.c",
     "fmi3.c",
 )
+_PROGRAMS = {"palpate_fmu": _SOURCES, "palpate_engine": ("field.c", "engine.c")}
 # small code for macOS: both machines' parts stand in one file of FMI 2.0, which is to be less than 200 kB
 # little is inlined there, and nothing unwinds; the head has room for a signature, and not a page of it
 _SMALL = (
@@ -77,6 +80,18 @@ def fmu_source() -> str:
     return generic_source(*_SOURCES)
 
 
+def engine_libraries() -> dict[str, bytes]:
+    """Return the libraries of a scene's engine by their endings: ".so" for Linux, ".dll", ".dylib" for both Macs."""
+    folder = resources.files("palpate.export") / "binaries"
+    kept = {file: (folder / _file_of(file, "palpate_engine")).read_bytes() for file in TARGETS}
+    parts = {file: kept[file] for file in _MAC_KINDS}
+    return {
+        ".so": kept["x86_64-linux/.so"],
+        ".dll": kept["x86_64-windows/.dll"],
+        ".dylib": _universal(parts),
+    }
+
+
 def built_binaries(version: str = "3.0") -> dict[str, bytes]:
     """Return the binaries that are kept with the package, by an FMU's folder and ending: "x86_64-linux/.so".
 
@@ -92,19 +107,23 @@ def built_binaries(version: str = "3.0") -> dict[str, bytes]:
     return binaries | ({_UNIVERSAL: _universal(parts)} if parts else {})
 
 
-def _file_of(target: str) -> str:
-    return target.replace("/", "_palpate_fmu")
+def _file_of(target: str, program: str = "palpate_fmu") -> str:
+    return target.replace("/", f"_{program}")
 
 
 def build_binaries() -> dict[str, bytes]:
-    """Return the binaries, compiled anew with `ziglang`."""
+    """Return all binaries by their files' names, compiled anew with `ziglang`."""
+    built = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "palpate_fmu.c").write_text(fmu_source(), "utf-8")
-        return {file: _compile(folder, options) for file, options in TARGETS.items()}
+        for program, sources in _PROGRAMS.items():
+            (folder / f"{program}.c").write_text(generic_source(*sources), "utf-8")
+            for target, options in TARGETS.items():
+                built[_file_of(target, program)] = _compile(folder, program, options)
+    return built
 
 
-def _compile(folder: Path, options: tuple[str, ...]) -> bytes:
+def _compile(folder: Path, program: str, options: tuple[str, ...]) -> bytes:
     # in the folder, by relative names: no path of this machine gets into the binary
     command = [
         sys.executable,
@@ -113,9 +132,9 @@ def _compile(folder: Path, options: tuple[str, ...]) -> bytes:
         "cc",
         *options,
         *_OPTIONS,
-        "palpate_fmu.c",
+        f"{program}.c",
         "-o",
-        "palpate_fmu.out",
+        f"{program}.out",
     ]
     command += [] if "windows" in options[1] else ["-lm"]
     environment = {
@@ -132,7 +151,7 @@ def _compile(folder: Path, options: tuple[str, ...]) -> bytes:
             why=done.stderr[-2000:],
             fix="Install the compiler: pip install ziglang.",
         )
-    return (folder / "palpate_fmu.out").read_bytes()
+    return (folder / f"{program}.out").read_bytes()
 
 
 def _cache() -> Path:
@@ -156,17 +175,17 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     built = build_binaries()
     folder = Path(str(resources.files("palpate.export"))) / "binaries"
-    hashes = {_file_of(file): hashlib.sha256(content).hexdigest() for file, content in built.items()}
+    hashes = {file: hashlib.sha256(content).hexdigest() for file, content in built.items()}
     if "--check" in arguments:
         kept = json.loads((folder / _HASHES).read_text("utf-8"))
         other = [file for file, digest in hashes.items() if kept.get(file) != digest]
         print(f"other than those that are kept: {other}" if other else "the same as those that are kept")  # noqa: T201
         return 1 if other else 0
     folder.mkdir(exist_ok=True)
-    for old in folder.glob("*_palpate_fmu.*"):
+    for old in folder.glob("*_palpate_*"):
         old.unlink()
     for file, content in built.items():
-        (folder / _file_of(file)).write_bytes(content)
-        print(f"{_file_of(file)}  {len(content) / 1e3:.0f} kB")  # noqa: T201
+        (folder / file).write_bytes(content)
+        print(f"{file}  {len(content) / 1e3:.0f} kB")  # noqa: T201
     (folder / _HASHES).write_text(json.dumps(hashes, indent=2) + "\n", "utf-8")
     return 0

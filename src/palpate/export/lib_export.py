@@ -1,4 +1,4 @@
-"""Export as a shared library with a plain C ABI, with wrappers for Python, Unity, Unreal and MATLAB.
+"""Export as a shared library with a plain C ABI, with wrappers for Python and MATLAB.
 
 Functions take pointers to doubles and whole numbers of 32 bits, no structures by value and no callbacks. The library
 is compiled by this machine's compiler; without one the sources and their CMake file are what is written.
@@ -38,7 +38,7 @@ class ExportedLibrary:
     sources : ExportedC
         The C files.
     wrappers : tuple of Path
-        For Python, Unity, Unreal and MATLAB.
+        For Python and MATLAB.
     library : Path, optional
         The shared library; None where there was no compiler.
     comparison : Comparison, optional
@@ -180,7 +180,6 @@ def _wrappers(surrogate: Surrogate, done: ExportedC) -> dict[str, str]:
         "@PARAMETERS@": "["
         + "; ".join(f"{v:.6g}" for v in [*middle[k:], 0.0][: max(1, len(middle) - k)])
         + "]",
-        "CLASS": name[0].upper() + name[1:] + "Body",
         "NAME": name,
     }
     memory = surrogate.memory
@@ -188,8 +187,6 @@ def _wrappers(surrogate: Surrogate, done: ExportedC) -> dict[str, str]:
     parts += ["FIELD"] * bool(done.field)
     templates = {
         f"{name}.py": "wrapper.py",
-        f"{words['CLASS']}.cs": "wrapper_unity.cs",
-        f"{name}_unreal.h": "wrapper_unreal.h",
         f"{name}_matlab.h": "wrapper_matlab.h",
         f"{name}_example.m": "example.m",
     }

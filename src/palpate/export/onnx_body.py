@@ -11,55 +11,22 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from palpate.errors import UsageError
 from palpate.export.onnx_graph import Graph, Value
 from palpate.export.onnx_network import Slopes, network_slopes, regressors
-from palpate.export.onnx_surface import Distance, distance_to
-from palpate.surrogates.baselines import (
-    ConstantBaseline,
-    ContactBaseline,
-    OverlapBaseline,
-    PadBaseline,
-    require_ball,
-)
-from palpate.surrogates.baselines.overlap_baseline import LARGEST, SMALLEST
+from palpate.export.onnx_surface import distance_to
+from palpate.surrogates.baselines import Baseline, require_ball
+from palpate.surrogates.baselines.graph_form import BaselineForm, Distance, Touch, outer
 from palpate.surrogates.energy import LearntEnergy
 
-__all__ = ["BODY_OUTPUTS", "BaselineForm", "Touch", "add_body", "onnx_form"]
+__all__ = ["BODY_OUTPUTS", "add_body"]
 
 SLACK = 1e-9  # share of a range: round-off at its edge is still inside, as in the compiled kernels
 STEP = 1e-3  # step over the probe's radius, of the difference for the third derivative of the distance
 BODY_OUTPUTS = ("energy", "force", "stiffness", "amplitude", "slope", "depth", "inside", "deviation")
-
-
-@dataclass(frozen=True)
-class BaselineForm:
-    """A baseline at a place: its energy with derivatives, and the signed root."""
-
-    energy: Value  # U₀ (N, 1)
-    gradient: Value  # ∇U₀ (N, 3)
-    hessian: Value  # ∇²U₀ (N, 3, 3)
-    root: Value  # signed root of 2 U₀ (N, 1)
-    by: Value  # its slope (N, 3)
-
-
-@dataclass(frozen=True)
-class Touch:
-    """A probe at a surface: its depth, and how far that is beyond training."""
-
-    distance: Distance  # to the surface, of any places
-    depth: Value  # s (N, 1)
-    contact: Value  # bool (N, 1)
-    normal: Value  # ∇d (N, 3)
-    bend: Value  # ∇²d (N, 3, 3)
-    excess: Value  # s − σ(s)
-    slope: Value  # σ'
-    curvature: Value  # σ''
 
 
 def add_body(graph: Graph, energy: LearntEnergy, *, apart: bool = False) -> None:
@@ -90,9 +57,10 @@ def add_body(graph: Graph, energy: LearntEnergy, *, apart: bool = False) -> None
     graph.stage = "network"
     slopes = network_slopes(graph, net, xi, k)
     graph.stage = "baseline"
-    known = onnx_form(baseline, graph, place, touch, xi)
-    if isinstance(baseline, PadBaseline):
-        slopes = _with_polynomial(graph, baseline, xi, half, slopes, k)
+    known = baseline.graph_form(graph, place, touch, xi)
+    if (more := baseline.graph_exponent(graph, xi, half)) is not None:
+        value, gradient, hessian = more
+        slopes = Slopes(slopes.value + value, slopes.gradient + gradient, slopes.hessian + hessian)
     graph.stage = "slopes"
     slopes = _through_box(slopes, slope.columns(0, k), curvature.columns(0, k), k)
     slopes = _to_space(slopes, D)
@@ -133,154 +101,22 @@ def _touch(graph: Graph, energy: LearntEnergy, X: Value, place: Value) -> Touch:
     baseline, at = energy.baseline, energy.baseline.radius_input
     assert baseline.surface is not None
     radius: Any = baseline.radius if at is None else X.columns(at, at + 1)
-    distance = distance_to(graph, baseline.surface)
+    find = functools.partial(distance_to, graph)
+    distance = find(baseline.surface)
     d, normal, bend = distance(place)
     s = radius - d
     contact = s > 0.0
     if not math.isfinite(energy.going.deepest):
         zero = s * 0.0
-        return Touch(distance, s, contact, normal, bend, zero, zero + 1.0, zero)
+        return Touch(distance, find, s, contact, normal, bend, zero, zero + 1.0, zero)
     held, slope, curvature = _saturated(graph, s, energy.going.deepest, energy.going.depth_width)
-    return Touch(distance, s, contact, normal, bend, s - held, slope, curvature)
-
-
-@functools.singledispatch
-def onnx_form(baseline: Any, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
-    """Return U₀ and its derivatives by the place (N, 3), which each kind registers: ``@onnx_form.register``.
-
-    `touch` is the probe at the baseline's surface where there is one, `xi` are the scaled inputs (N, n).
-    """
-    raise UsageError(
-        f"The baseline {type(baseline).name!r} has no ONNX form.",
-        why="Its formula is Python code that is compiled for this machine.",
-        fix="Export a body under a probe, a pad or beam loads.",
-    )
-
-
-@onnx_form.register
-def _constant(baseline: ConstantBaseline, graph: Graph, place: Value, touch: Any, xi: Value) -> BaselineForm:
-    zero = place * 0.0
-    level = place.columns(0, 1) * 0.0 + baseline.level
-    return BaselineForm(level, zero, _outer(zero, zero), level * 0.0, zero)
-
-
-@onnx_form.register
-def _contact(baseline: ContactBaseline, graph: Graph, place: Value, touch: Touch, xi: Value) -> BaselineForm:
-    """Return the contact law at the depth s; see `palpate.surrogates.contact_law`."""
-    return _law(baseline, graph, graph.where(touch.contact, touch.depth, 1.0), touch.normal, touch.bend)
-
-
-@onnx_form.register
-def _overlap(baseline: OverlapBaseline, graph: Graph, place: Value, touch: Touch, xi: Value) -> BaselineForm:
-    """Return the contact law at the equivalent depth of the overlap."""
-    e, slope, bend = distance_to(graph, baseline.pressed)(place)
-    measured = baseline.radius - e
-    depth = measured
-    ends = (SMALLEST, measured < touch.depth * SMALLEST), (LARGEST, measured > touch.depth * LARGEST)
-    for factor, off in ends:
-        depth, slope = (
-            graph.where(off, touch.depth * factor, depth),
-            graph.where(off, touch.normal * factor, slope),
-        )
-        bend = graph.where(off.spread(2), touch.bend * factor, bend)
-    return _law(baseline, graph, graph.where(touch.contact, depth, 1.0), slope, bend)
-
-
-def _law(baseline: ContactBaseline, graph: Graph, s: Value, normal: Value, bend: Value) -> BaselineForm:
-    """Return the contact law at a depth s of slope −`normal` and Hessian −`bend`."""
-    twice, factor, length = baseline.law.numbers()
-    p = 0.5 * twice
-    g: Any = factor
-    g = graph.sqrt(s) * g if twice == 5.0 else s * g if twice == 6.0 else s * 0.0 + g
-    ratio: Any = 0.0
-    if math.isfinite(length):
-        ratio = s / (length + s)
-        g = g / graph.sqrt(1.0 + s / length)
-    value, slope = g * s * s, g * s * (p - 0.5 * ratio)
-    second = g * (p * (p - 1.0) - p * ratio + 0.75 * ratio * ratio)
-    hessian = second.spread(2) * _outer(normal, normal) - slope.spread(2) * bend
-    gradient, root = -slope * normal, graph.sqrt(2.0 * value)
-    return BaselineForm(value, gradient, hessian, root, gradient / root)
-
-
-@onnx_form.register
-def _pad(baseline: PadBaseline, graph: Graph, place: Value, touch: Any, xi: Value) -> BaselineForm:
-    """Return ½ ‖S u‖² and its derivatives, with S at the scaled inputs after the felt ones."""
-    D = baseline.axes
-    k = len(D)
-    coefficients, pairs = baseline.rest.compiled()
-    terms = []
-    one = xi.columns(0, 1) * 0.0 + 1.0
-    for first, second in pairs.tolist():
-        term = one
-        for at in (first, second):
-            if at >= 0:
-                term = term * xi.columns(k + at, k + at + 1)
-        terms.append(term)
-    upper = (terms[0] if len(terms) == 1 else graph.join(*terms)) @ coefficients
-    i, j = np.triu_indices(k)
-    spread = np.zeros((len(i), k * k))  # from the entries i ≤ j to the whole matrix
-    spread[np.arange(len(i)), i * k + j] = 1.0
-    spread[np.arange(len(i)), j * k + i] = 1.0
-    S = (upper @ spread).rows_as(k, k)
-    u = (place @ D.T).spread(2)
-    v = S @ u
-    gradient = (S @ v).rows_as(k) @ D
-    hessian = graph.constant(D.T) @ (S @ S) @ D
-    twice = (v * v).sum(1).rows_as(1)
-    if k == 1:
-        return BaselineForm(0.5 * twice, gradient, hessian, v.rows_as(1), S.rows_as(1) @ D)
-    root = graph.sqrt(twice)
-    by = graph.where(root > 0.0, gradient / graph.where(root > 0.0, root, 1.0), 0.0)
-    return BaselineForm(0.5 * twice, gradient, hessian, root, by)
-
-
-def _with_polynomial(
-    graph: Graph, baseline: PadBaseline, xi: Value, half: np.ndarray, slopes: Slopes, k: int
-) -> Slopes:
-    """Return ℓ with the polynomial P of all scaled inputs added to it."""
-    coefficients, exponents = baseline.stiffening.coefficients, baseline.stiffening.exponents
-    if not len(coefficients):
-        return slopes
-    n, highest = exponents.shape[1], int(exponents.max())
-    columns = [xi.columns(i, i + 1) for i in range(n)]
-    powers = [[columns[i] * 0.0 + 1.0] for i in range(n)]
-    for i in range(n):
-        for _ in range(highest):
-            powers[i].append(powers[i][-1] * columns[i])
-
-    def total(*by: int) -> Value:
-        """Return the polynomial, differentiated by some of the scaled inputs."""
-        value: Value = columns[0] * 0.0
-        for c, row in zip(coefficients.tolist(), exponents.tolist(), strict=True):
-            left, factor = list(row), float(c)
-            for i in by:
-                factor *= left[i]
-                left[i] -= 1
-            if factor == 0.0:
-                continue
-            term: Any = factor
-            for i, power in enumerate(left):
-                if power > 0:
-                    term = powers[i][power] * term
-            value = value + term
-        return value
-
-    gradient = graph.join(*[total(i) * (1.0 / half[i]) for i in range(k)])
-    entries = [total(i, j) * (1.0 / (half[i] * half[j])) for i in range(k) for j in range(k)]
-    hessian = graph.join(*entries).rows_as(k, k)
-    return Slopes(slopes.value + total(), slopes.gradient + gradient, slopes.hessian + hessian)
-
-
-def _outer(a: Value, b: Value) -> Value:
-    """Return a bᵀ (N, m, m) of vectors (N, m)."""
-    return a.spread(2) * b.spread(1)
+    return Touch(distance, find, s, contact, normal, bend, s - held, slope, curvature)
 
 
 def _through_box(slopes: Slopes, slope: Value, curvature: Value, felt: int) -> Slopes:
     """Take derivatives by saturated inputs to those by what came before the saturation."""
     bent = (curvature * slopes.gradient).spread(2) * np.eye(felt)
-    return Slopes(slopes.value, slopes.gradient * slope, slopes.hessian * _outer(slope, slope) + bent)
+    return Slopes(slopes.value, slopes.gradient * slope, slopes.hessian * outer(slope, slope) + bent)
 
 
 def _to_space(slopes: Slopes, D: np.ndarray) -> Slopes:
@@ -291,23 +127,24 @@ def _to_space(slopes: Slopes, D: np.ndarray) -> Slopes:
     return Slopes(slopes.value, slopes.gradient @ D, graph.constant(D.T) @ slopes.hessian @ D)
 
 
-def _leave(graph: Graph, baseline: Any, touch: Touch, slopes: Slopes, place: Value) -> Slopes:
+def _leave(graph: Graph, baseline: Baseline, touch: Touch, slopes: Slopes, place: Value) -> Slopes:
     """Take derivatives by the place c̃ at the saturated depth to those by c; see `contact_baseline`."""
     d, g, H = touch.normal, slopes.gradient, slopes.hessian
     m, rest, curvature = touch.excess, 1.0 - touch.slope, touch.curvature
+    assert baseline.surface is not None  # it is touched
     usual = baseline.radius if math.isfinite(baseline.radius) else baseline.surface.reach
     bend = _bend(graph, touch.distance, place, g, STEP * usual)
     matrix = [value.spread(2) for value in (m, rest, curvature)]
-    outer = _outer(d, d)
-    J = matrix[0] * touch.bend - matrix[1] * outer + np.eye(3)
+    square = outer(d, d)
+    J = matrix[0] * touch.bend - matrix[1] * square + np.eye(3)
     h = (touch.bend @ g.spread(2)).rows_as(3)
     along = (d * g).sum(1).spread(2)
     new = (J @ g.spread(2)).rows_as(3)
     hessian = (
         J @ H @ J.swap()
         + matrix[0] * bend
-        - (matrix[1] * touch.bend + matrix[2] * outer) * along
-        - matrix[1] * (_outer(d, h) + _outer(h, d))
+        - (matrix[1] * touch.bend + matrix[2] * square) * along
+        - matrix[1] * (outer(d, h) + outer(h, d))
     )
     return Slopes(slopes.value, new, hessian)
 
@@ -316,7 +153,7 @@ def _bend(graph: Graph, distance: Distance, place: Value, g: Value, step: float)
     """Return the derivative of ∇²d along g, by differences of fourth order."""
     size = graph.sqrt((g * g).sum(1))
     way = g / graph.where(size > 0.0, size, 1.0)
-    parts = []
+    parts: list[Value] = []
     for many, weight in ((1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)):
         bend = distance(place + (many * step) * way)[2]
         parts.append((size * (weight / (12.0 * step))).spread(2) * bend)
@@ -343,8 +180,8 @@ def _answers(
     value = kappa * known.energy
     b, g = known.gradient, slopes.gradient
     force = -(kappa * b + value * g)
-    stiffness = -kappa.spread(2) * (known.hessian + _outer(b, g) + _outer(g, b))
-    stiffness = stiffness - value.spread(2) * (_outer(g, g) + slopes.hessian)
+    stiffness = -kappa.spread(2) * (known.hessian + outer(b, g) + outer(g, b))
+    stiffness = stiffness - value.spread(2) * (outer(g, g) + slopes.hessian)
     depth = graph.sqrt((place * place).sum(1)) if touch is None else touch.depth
     inside = _inside(graph, energy, X, depth)
     root = graph.sqrt(kappa)
@@ -407,7 +244,7 @@ def _deviation(graph: Graph, energy: LearntEnergy, X: Value, value: Value, force
     by = lines @ root  # (N, k, z)
     if k < 3:
         by = graph.constant(D.T) @ by
-    spread = _outer(force, moved) - value.spread(2) * by
+    spread = outer(force, moved) - value.spread(2) * by
     total = graph.sqrt((spread * spread).sum(1, 2).rows_as(1))
     size = graph.sqrt((force * force).sum(1))
     return graph.where(size > 0.0, total / graph.where(size > 0.0, size, 1.0), 0.0)

@@ -16,7 +16,6 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.export.answer_network import answers_of
-from palpate.export.c_export import block_of
 from palpate.export.check_answers import MOST_SLOPES, Replies, compare_answers
 from palpate.export.check_points import (
     ANSWERS,
@@ -60,45 +59,44 @@ def export_onnx(
     """
     require_outputs([path], endings=(".onnx",), overwrite=overwrite)
     require_onnx()
-    if isinstance(thing, Surrogate) and thing.memory is not None:
+    surrogate = Surrogate.of(thing)
+    if surrogate.memory is not None:
         if not elastic:
             raise UsageError(
-                f"The memory {thing.memory.name!r} has no ONNX form.",
+                f"The memory {surrogate.memory.name!r} has no ONNX form.",
                 why="A graph has no state of its own, and this memory's is not written as inputs and outputs.",
                 fix="Export it with `palpate export c` or `lib`, or with --elastic its answer without memory.",
             )
-        thing = replace(thing, memory=None)
+        surrogate = replace(surrogate, memory=None)
     graph = Graph(np.float32 if single else np.float64)
-    answers = answers_of(thing)
-    if answers is not None:
-        name = answers.name
-        block = block_of(thing, field=None, with_field=False, deviation=False)
+    if (answers := answers_of(surrogate)) is not None:
+        block = WeightsBlock.of_answers(answers)
         add_network(graph, *answers.networks)
     else:
-        assert isinstance(thing, Surrogate)
-        block, name = WeightsBlock.of(replace(thing, fields={})), thing.name
-        add_body(graph, thing.hand_energy)
-    model = graph.model(name, _metadata(thing, block))
-    comparison = _compared(thing, model, Precision(single, tolerance)) if check else None
+        block = WeightsBlock.of(replace(surrogate, fields={}))
+        add_body(graph, surrogate.hand_energy)
+    model = graph.model(surrogate.name, _metadata(surrogate, block))
+    comparison = _compared(surrogate, model, Precision(single, tolerance)) if check else None
     if comparison is not None:
         fix = "Export it in double precision." if single else "Report this with the model file."
-        comparison.require(f"The ONNX model of {name} does", why="", fix=f"Nothing was written. {fix}")
+        comparison.require(
+            f"The ONNX model of {surrogate.name} does", why="", fix=f"Nothing was written. {fix}"
+        )
     return ExportedFile(write_file(Path(path), model.SerializeToString()), block.hash, comparison)
 
 
-def _metadata(thing: Surrogate | Network, block: WeightsBlock) -> dict[str, str]:
+def _metadata(surrogate: Surrogate, block: WeightsBlock) -> dict[str, str]:
     """Return names, units, limits and the hash, as the model's properties."""
-    inputs = [asdict(r) for r in thing.inputs]
-    card = card_of(thing).with_hash(block.label, block.hash)
+    inputs = [asdict(r) for r in surrogate.inputs]
+    card = card_of(surrogate).with_hash(block.label, block.hash)
     plain = {
         "inputs": json.dumps(inputs),
         "sha256": block.hash,
         "producer": "palpate",
         "card": card.to_json(),
     }
-    if (answers := answers_of(thing)) is not None:
+    if (answers := answers_of(surrogate)) is not None:
         return plain | {"outputs": json.dumps([asdict(q) for q in answers.outputs]), "name": answers.name}
-    assert isinstance(thing, Surrogate)
     units = {
         "energy": "J",
         "force": "N",
@@ -108,10 +106,10 @@ def _metadata(thing: Surrogate | Network, block: WeightsBlock) -> dict[str, str]
         "slope": "J^0.5/m",
     }
     about = "force is that on the hand; inside tells whether it may be trusted, deviation is relative to the force"
-    return plain | {"outputs": json.dumps(units), "about": about, "name": thing.name}
+    return plain | {"outputs": json.dumps(units), "about": about, "name": surrogate.name}
 
 
-def _compared(thing: Surrogate | Network, model: Any, precision: Precision) -> Comparison | None:
+def _compared(surrogate: Surrogate, model: Any, precision: Precision) -> Comparison | None:
     try:
         import onnxruntime  # type: ignore[import-untyped,unused-ignore]
     except ImportError:
@@ -119,7 +117,7 @@ def _compared(thing: Surrogate | Network, model: Any, precision: Precision) -> C
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     session = onnxruntime.InferenceSession(model.SerializeToString(), options)
-    if (answers := answers_of(thing)) is not None:
+    if (answers := answers_of(surrogate)) is not None:
         kind = np.float32 if precision.single else np.float64
         wanted = ["y", "jacobian"] if len(answers.outputs) <= MOST_SLOPES else ["y"]
 
@@ -128,10 +126,9 @@ def _compared(thing: Surrogate | Network, model: Any, precision: Precision) -> C
             return replies[0], None, replies[1] if len(replies) > 1 else None
 
         return compare_answers(answers, ask, precision)
-    assert isinstance(thing, Surrogate)
-    bare = replace(thing, fields={})
+    bare = replace(surrogate, fields={})
     return compare_body(
-        bare, OnnxAsker(session, bare), precision, deviation=thing.hand_energy.root is not None
+        bare, OnnxAsker(session, bare), precision, deviation=surrogate.hand_energy.root is not None
     )
 
 

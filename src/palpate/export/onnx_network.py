@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from palpate.export.onnx_graph import Graph, Value
-from palpate.network import Network
+from palpate.network import Network, Scaling
 from palpate.network.radial import radial
 
 __all__ = ["Slopes", "add_network", "network_slopes", "regressors"]
@@ -109,6 +109,18 @@ def regressors(graph: Graph, network: Network, xi: Value, felt: int) -> tuple[Va
     return graph.join(one, xi, units.phi), (graph.join(*lines) if felt > 1 else lines[0])
 
 
+def _scaled(graph: Graph, scaling: Scaling, X: Value) -> tuple[Any, Value | None]:
+    """Return scaled inputs (N, n), and what bends multiply their derivatives by h (N, n); None without bends."""
+    far: Any = X - scaling.input_centre
+    h, b = scaling.input_half, scaling.input_bend
+    if not scaling.is_bent:
+        return far / h, None
+    least = h / (2.0 * (1.0 + np.abs(b)))
+    d: Any = graph.maximum(far * b + h, least)
+    near = graph.where(d > least, h / d, far * 0.0 + 1.0)
+    return far / d, near * (h / d)
+
+
 def add_network(graph: Graph, *networks: Network) -> None:
     """Add the input ``x`` (N, n), and the outputs ``y`` (N, m) and ``jacobian`` (N, m, n), to a graph.
 
@@ -120,9 +132,12 @@ def add_network(graph: Graph, *networks: Network) -> None:
     values: Any = None
     slopes: Any = None
     for network in networks:
-        scaling, rows = network.scaling, _rows(network)
-        row, lines = regressors(graph, network, (X - scaling.input_centre) / scaling.input_half, n)
+        rows = _rows(network)
+        xi, turn = _scaled(graph, network.scaling, X)
+        row, lines = regressors(graph, network, xi, n)
         value, slope = row @ rows, (lines @ rows).swap()
+        if turn is not None:
+            slope = slope * turn.spread(1)
         values = value if values is None else values + value
         slopes = slope if slopes is None else slopes + slope
     graph.output("y", values, (m,))

@@ -15,12 +15,11 @@ from palpate.export.lattice_tiles import SIDE, cut_tiles
 from palpate.export.onnx_graph import Graph, Value
 from palpate.export.surface_tiles import felt_coefficients
 from palpate.network.packing import whole_multiples
+from palpate.surrogates.baselines.graph_form import Distance
 from palpate.surrogates.surface import TouchedSurface
 
-__all__ = ["Distance", "distance_to"]
+__all__ = ["distance_to"]
 
-# places (N, 3) to the signed distance (N, 1), its gradient (N, 3) and its Hessian (N, 3, 3)
-Distance = Callable[[Value], tuple[Value, Value, Value]]
 # first nodes (N, 1), one array for each axis, to coefficients (N, 4^axes)
 Lookup = Callable[[Sequence[Value]], Value]
 FAR = 1e6  # cells beyond the box, after which nothing changes

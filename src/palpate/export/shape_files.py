@@ -23,7 +23,7 @@ from palpate.errors import UsageError
 from palpate.export.gltf import MOST_TARGETS, ShapeSeries, write_glb
 from palpate.files import writing, writing_folder
 from palpate.output_files import require_outputs, seal
-from palpate.surrogates import FieldSurrogate
+from palpate.surrogates import Surrogate
 
 __all__ = ["SHAPES", "series_of_dataset", "series_of_surrogate", "write_shapes", "write_vtu_series"]
 
@@ -146,23 +146,22 @@ def series_of_dataset(data: Dataset, rows: Sequence[int] | None = None, name: st
     return ShapeSeries(points, cells, u, order, name, fields)
 
 
-def series_of_surrogate(surrogate: Any, X: np.ndarray) -> ShapeSeries:
+def series_of_surrogate(surrogate: Surrogate, X: np.ndarray) -> ShapeSeries:
     """Return the shapes at inputs X (k, n), numbered from 1, of a body that was learnt with its displacement."""
-    shown = surrogate.fields.get("displacement")
-    if shown is None:
+    shown, line = surrogate.surface_fields.get("displacement"), surrogate.line
+    if shown is not None:
+        (points, cells), u = shown.pictured, shown.at_pictured(shown.values(X))
+    elif line is not None:
+        cells = _pieces(line.points[:, 0])
+        points, u = _upright(line.points[:, :2]), _upright(line.values(X)[..., :2])
+    else:
         raise UsageError(
             f"The body {surrogate.name!r} has no shape.",
             why="It was learnt without its displacement.",
             fix="Learn it with shape=True.",
         )
-    u = np.asarray(shown.values(X))
-    if isinstance(shown, FieldSurrogate):
-        (points, cells), u = shown.pictured, shown.at_pictured(u)
-    else:
-        cells = _pieces(shown.points[:, 0])
-        points, u = _upright(shown.points[:, :2]), _upright(u[..., :2])
     fields = {}
-    if (stress := surrogate.fields.get("von_mises")) is not None:
+    if (stress := surrogate.surface_fields.get("von_mises")) is not None:
         fields["von Mises stress"] = stress.at_pictured(np.asarray(stress.values(X)))[..., 0]
     return ShapeSeries(points, cells, u, np.arange(1.0, len(u) + 1), surrogate.name, fields)
 

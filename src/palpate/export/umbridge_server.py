@@ -48,17 +48,13 @@ class ServedModel:
         return named | {"ApplyHessian": self.hessian is not None}
 
 
-def served_models(model: Any) -> dict[str, ServedModel]:
-    """Return the models by name that a loaded file is served as; a file that has none is refused."""
-    if isinstance(model, Surrogate):
-        served = _touch_models(model) if model.can_be_touched else {}
-        served |= {name: _quantities(part) for name, part in model.quantities.items()}
-    else:
-        network = model if isinstance(model, Network) else getattr(model, "network", None)
-        served = {"outputs": _numbers(network)} if isinstance(network, Network) else {}
+def served_models(surrogate: Surrogate) -> dict[str, ServedModel]:
+    """Return the models by name that a surrogate is served as; one that has none is refused."""
+    served = _touch_models(surrogate) if surrogate.can_be_touched else {}
+    served |= {name: _quantities(part) for name, part in surrogate.quantities.items()}
     if not served:
         raise UsageError(
-            f"A {type(model).__name__} without energy and without quantities can't be served.",
+            "A surrogate without energy and without quantities can't be served.",
             why="UM-Bridge's models answer a few numbers, not fields.",
             fix="Learn numbers too: map one place of a field, or its largest value, by `at` or `reduce`.",
         )

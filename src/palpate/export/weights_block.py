@@ -408,7 +408,7 @@ def net_tables(network: Network, first: int, felt: int) -> dict[int, Table]:
     tail = np.concatenate([rows[: 1 + n].ravel(), modes.ravel()])
     return {
         first: Table.of(np.array(sizes)),
-        first + 1: Table.of(scales),
+        first + 1: Table.of(scales if network.scaling.is_bent else scales[:2]),
         first + 2: Table.of(layout[1:].reshape(e, 2)),
         first + 3: Table.of(filled),
         first + 4: Table.of(tail),

@@ -25,8 +25,10 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.improvement.choice_rules import choose_by_disagreement, choose_by_variance, choose_farthest
 from palpate.improvement.force_model import ForceModel
+from palpate.improvement.improve_answers import AnswerImprovement, unseen_places
+from palpate.improvement.improvement_step import ImprovementStep
 from palpate.improvement.kept_solves import KeptSolves
-from palpate.improvement.stop_rule import StopRule, relative_errors
+from palpate.improvement.stop_rule import AnswerStopRule, StopRule, relative_errors
 from palpate.learning.learn_dataset import learn as learn_dataset
 from palpate.learning.pressed_solves import PROBES, PressedSolves
 from palpate.options import ImprovementOptions, declarations, takes
@@ -59,69 +61,6 @@ Interest = Callable[[np.ndarray], np.ndarray]
 Log = Callable[[str], None]
 
 
-@dataclass(frozen=True, eq=False)
-class ImprovementStep:
-    """State of an improvement after a part of the work.
-
-    Attributes
-    ----------
-    phase : {"solved", "learnt", "judged", "ended"}
-        A batch was solved; a surrogate was learnt, the first one (or that of an earlier run) before it is judged; the
-        first one was judged; or nothing more will come.
-    solves, unseen : int
-        Converged solves to learn from, and those to judge by.
-    error, median : float
-        Relative force error of the surrogate on the unseen solves, at the 95th percentile and the median;
-        not-a-number while there is no surrogate, or nothing to judge it by.
-    places : (k, 3) array
-        Contact points of the solves on the surface at rest, m, in the order in which they were solved.
-    values : (k,) array
-        Relative force error of each of these solves when it is left out of learning; not-a-number where it is not
-        known, as of solves that the surrogate has not learnt from.
-    seconds : float
-        Time since the improvement began.
-    surrogate : Surrogate or None
-        The best so far on the unseen solves.
-    train, test : Dataset or None
-        The solves to learn from, and those to judge by.
-    history : optional
-        Record of the learning of the surrogate.
-    is_new : bool
-        Whether this step has brought a surrogate that takes the place of the last one.
-    before, tried : float
-        Where a surrogate was learnt beside an earlier one: the error of the earlier and that of the new one, both on
-        the same unseen solves, at the 95th percentile; else not-a-number. The new one was kept where `is_new` says so.
-    reached : bool
-        Whether the wanted error is kept.
-    reason : str
-        Why the improvement has ended; empty before.
-    model_path : Path or None
-        File of the surrogate, where there is one.
-    mesh : float
-        The mesh's part in the relative force error, beside `error`; not-a-number where no finer mesh was solved.
-    """
-
-    phase: str
-    solves: int
-    unseen: int
-    error: float
-    median: float
-    places: np.ndarray
-    values: np.ndarray
-    seconds: float
-    surrogate: Surrogate | None
-    train: Dataset | None
-    test: Dataset | None
-    history: Any = None
-    is_new: bool = False
-    reached: bool = False
-    reason: str = ""
-    model_path: Path | None = None
-    mesh: float = math.nan
-    before: float = math.nan
-    tried: float = math.nan
-
-
 @takes(ImprovementOptions)
 def improve(
     problem: Problem,
@@ -137,15 +76,19 @@ def improve(
     log: Log = lambda _: None,
     options: ImprovementOptions,
 ) -> Iterator[ImprovementStep]:
-    """Solve a body under a probe where the force is least certain, learn, and yield each step, until an error is kept.
+    """Solve where the answers are least certain, learn, and yield each step, until an error is kept.
+
+    Of a body under a probe the error is that of the force, over the force; of numbers, fields and curves it is that
+    over the range of the answer that misses most. Either is the 95th percentile of unseen solves.
 
     Parameters
     ----------
     problem : Problem
-        A body under a probe, ``body.problem(SphereProbe(…))``, or a family of bodies.
+        A body under a probe, ``body.problem(SphereProbe(…))``, or a family of bodies; or a problem without touch, such
+        as an `ExternalProblem`.
     unseen : int or (U, n) array
-        Number of solves to judge by, in depth series of two at places of their own; or their inputs, in the order in
-        which they are solved.
+        Number of solves to judge by: of a body in depth series of two at places of their own, else at random places; or
+        their inputs, in the order in which they are solved.
     interest : callable, optional
         From inputs (C, n) of places to weights (C,) of at least zero: how much an error at each of them counts, such as
         where a hand goes. It is asked anew for each batch; by default all places count the same.
@@ -170,14 +113,19 @@ def improve(
     Raises
     ------
     UsageError
-        For a wrong argument, a problem that no probe presses, or paths that hold another problem's solves.
+        For a wrong argument, a body that acts otherwise than under one probe, or paths that hold another problem's
+        solves.
     SolverError
         If more than half of the first solves fail.
     """
-    _check_problem(problem)
+    is_pressed = _is_pressed(problem)
     if isinstance(unseen, int | np.integer):
         checks.fits("The number of unseen solves", unseen, least=1, whole=True)
-        unseen = problem.design(int(unseen), options.seed + 7, depths=2)  # type: ignore[attr-defined]
+        unseen = (
+            problem.design(int(unseen), options.seed + 7, depths=2)  # type: ignore[attr-defined]
+            if is_pressed
+            else unseen_places(problem, int(unseen), options.seed)
+        )
     count_of_workers = options.workers or available_cores()
     size = options.batch or int(
         np.clip(count_of_workers * -(-SMALLEST_BATCH // count_of_workers), SMALLEST_BATCH, LARGEST_BATCH)
@@ -187,14 +135,15 @@ def improve(
         if cluster is None:
             cluster = stack.enter_context(local_cluster(options.workers))
         solving = {"cluster": cluster, "progress": progress, "case_limit": options.case_limit}
-        work = _Improvement(
+        kind, rule = (_Improvement, StopRule) if is_pressed else (AnswerImprovement, AnswerStopRule)
+        work = kind(
             problem,
             KeptSolves.open(problem, None if path is None else Path(path), **solving),
             KeptSolves.open(
                 problem, None if unseen_path is None else Path(unseen_path), design="points", **solving
             ),
             np.asarray(unseen, dtype=float),
-            StopRule(options.until, options.limit, options.most),
+            rule(options.until, options.limit, options.most),
             options,
             interest,
             size,
@@ -209,15 +158,19 @@ def _learn(data: Dataset, effort: float, *, workers: int | None, log: Log) -> tu
     return learn_dataset(data, effort=effort, workers=workers, log=log)
 
 
-def _check_problem(problem: Any) -> None:
+def _is_pressed(problem: Any) -> bool:
+    """Return whether a problem is a body under one probe, or without touch; any other is refused."""
     acting = problem.describe().get("interactions", ()) if hasattr(problem, "describe") else ()
     kinds = [entry.get("type") for entry in acting if isinstance(entry, dict)]
-    if len(kinds) != 1 or kinds[0] not in PROBES or not hasattr(problem, "design"):
+    if len(kinds) == 1 and kinds[0] in PROBES and hasattr(problem, "design"):
+        return True
+    if kinds or not hasattr(problem, "describe"):
         raise UsageError(
-            "Solves can be chosen for a body under one probe only.",
+            "Solves can be chosen for a body under one probe, or for a problem without touch.",
             why=f"On this body act: {', '.join(map(str, kinds)) or 'nothing that its description tells'}.",
             fix="Use body.problem(SphereProbe(…)); `palpate.sweep` takes any other problem.",
         )
+    return False
 
 
 @dataclass(eq=False)
@@ -357,10 +310,10 @@ class _Improvement:
         train = self.kept.good
         assert train is not None
         self.pressed = self._pressed(train)
+        # counted from what the surrogate counts from: over grooves that is the overlap
+        baseline = self.pressed.baseline if self.best is None else self.best[0].hand_energy.baseline
         with threadpool_limits(1):
-            self.model = ForceModel.fit(
-                self.pressed.solves, self.pressed.baseline, self.model, seed=self.options.seed
-            )
+            self.model = ForceModel.fit(self.pressed.solves, baseline, self.model, seed=self.options.seed)
         return self.model
 
     def _pressed(self, train: Dataset) -> PressedSolves:

@@ -101,8 +101,8 @@ class KeptSolves:
             # compared as the file has it: tuples are lists there
             if kept.data.provenance.get("problem") != json.loads(json.dumps(problem.describe())):
                 raise UsageError(
-                    f"{path} is not of this body and probe.",
-                    why="Either was changed after these solves.",
+                    f"{path} holds solves of another problem.",
+                    why="Body, probe, templates or mapping were changed after these solves.",
                     fix="Delete it, or write to another path.",
                 )
         if (plan := kept._unfinished()) is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from palpate.options import StopOptions
 from palpate.surrogates import Surrogate
 from palpate.validation.unseen_solves import ForceSamples, TouchSolves
 
-__all__ = ["StopRule", "relative_errors"]
+__all__ = ["AnswerStopRule", "StopRule", "relative_errors"]
 
 
 def relative_errors(surrogate: Surrogate, unseen: Dataset | None) -> np.ndarray:
@@ -36,6 +37,8 @@ class StopRule(StopOptions):
     is judged by all unseen solves.
     """
 
+    what: ClassVar[str] = "force error"  # name of the error in sentences
+
     def reason(
         self,
         errors: Sequence[float],
@@ -53,7 +56,7 @@ class StopRule(StopOptions):
         """
         if self.is_reached(errors, complete=complete):
             told = errors[-1] if kept is None else kept
-            return f"The force error is {share(told)} on unseen solves, {share(self.until)} were asked for."
+            return f"The {self.what} is {share(told)} on unseen solves, {share(self.until)} were asked for."
         if seconds >= self.limit:
             return f"The limit of {duration(self.limit)} is over."
         if solves >= self.most:
@@ -63,3 +66,10 @@ class StopRule(StopOptions):
     def is_reached(self, errors: Sequence[float], *, complete: bool) -> bool:
         """Return whether the last two surrogates keep the error, or the only one; see `reason`."""
         return complete and bool(errors) and all(e <= self.until for e in errors[-2:])
+
+
+@dataclass(frozen=True)
+class AnswerStopRule(StopRule):
+    """The same rule for numbers, fields and curves."""
+
+    what: ClassVar[str] = "error"

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from palpate.dataset import Dataset
+from palpate.dataset import Dataset, is_history
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning.growth_frames import GrowthRecorder
@@ -65,8 +65,9 @@ _NOISELESS = {"choose": False, "networks": 1, "target": 1e-9, "ridge": 1e-13, "t
 @recogniser
 def recognise_bent(data: Dataset, request: Request) -> Recognised | None:
     """Return the body of solves under loads at nodes; None of any other dataset."""
-    if "input_node" not in data:
+    if "input_node" not in data or is_history(data):
         return None
+    request.log(f"displacements of {count(len(data), 'solve')}")
     names = ("heldout", "settings", "refinement", "passes", "coupling", "progress", "watch")
     own, further = request.split(*names)
     bent = BentSolves.of(data, request.search, **own)

@@ -21,7 +21,7 @@ NAME = ".touched_surface"  # in the folder of the store, where Zarr looks for no
 KIND = "touched-surface"
 OVERLAP_NAME, OVERLAP_KIND = ".overlap", "overlap"
 OVERLAP_BUILT = 1
-BUILT = 2  # another number where distances of the same surface are built otherwise
+BUILT = 3  # another number where distances of the same surface are built otherwise
 
 
 def touched_surface(

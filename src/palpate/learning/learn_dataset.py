@@ -12,18 +12,21 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from palpate import checks
 from palpate.dataset import Dataset, Layout
 from palpate.errors import UsageError
-from palpate.format import count, share
-from palpate.learning import bent_body, pad_solves, pressed_solves  # noqa: F401  # which enter the kinds that they recognise
+from palpate.format import share
+from palpate.learning import bent_body, pad_solves, plastic, pressed_solves  # noqa: F401  # which enter the kinds that they recognise
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
+from palpate.learning.arrays.input_bends import choose_bends
 from palpate.learning.dataset_answers import DatasetAnswers
 from palpate.learning.energy import EnergyHistory, SuspectSolve, learn_energy
 from palpate.learning.fields import LearntField, LearntModes, learn_modes
 from palpate.learning.learning_history import History
+from palpate.learning.plastic import MemoryFit
 from palpate.learning.recognised import Request, recognise
 from palpate.learning.search import Budget
 from palpate.options import FieldOptions, FitOptions, SearchOptions, takes
@@ -60,6 +63,8 @@ class LearningHistory:
         How long it took, s.
     filter : History, optional
         Record of the sequential filter, of a body that loads bend.
+    memory : MemoryFit, optional
+        How well the memory of a body fits the histories.
     """
 
     energy: EnergyHistory | None
@@ -69,6 +74,7 @@ class LearningHistory:
     filter: History | None = None
     quantities: Mapping[str, Fitted] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    memory: MemoryFit | None = None
 
     @property
     def suspects(self) -> tuple[SuspectSolve, ...]:
@@ -84,7 +90,8 @@ class LearningHistory:
             ]
             return "\n  ".join([*lines, *map(str, self.fields.values())])
         tried = len(self.energy.trials)
-        words = f"{self.solves} solves, {tried} networks of the energy tried in {self.seconds:.0f} s"
+        noun = "solves" if self.memory is None else "samples of histories"
+        words = f"{self.solves} {noun}, {tried} networks of the energy tried in {self.seconds:.0f} s"
         left = self.energy.meta.get("left_out", {})
         if left:
             words += (
@@ -99,7 +106,8 @@ class LearningHistory:
                 f"{1e3 * missed:.2g} mm" if learnt.field.unit == "m" else f"{missed:.2g} {learnt.field.unit}"
             )
             words += f"; {_SHOWN[name][0]}: {learnt.field.meta['modes']} modes, which miss {size}"
-        return "\n".join([words, *suspect_sentences(self.suspects)])
+        memory = [] if self.memory is None else [str(self.memory)]
+        return "\n".join([words, *memory, *suspect_sentences(self.suspects)])
 
     __repr__ = __str__
 
@@ -181,13 +189,11 @@ def learn(
     numbers, excluded = _kept_rows(train, leave_out)
     train, solves = train.take(numbers), len(numbers)
     origin = {"hash": train.ok.hash, "provenance": train.provenance}
-    if "input_node" in train:  # a body that loads bend
-        log(f"displacements of {count(solves, 'solve')}")
-    known = recognise(train, Request(options, layout, further))
+    known = recognise(train, Request(options, layout, further, log))
     if known is None:
         _refuse_options(further)
         return _learn_answers(train, name, options, log)
-    log(f"learning the energy of {count(solves, 'solve')}")
+    log(f"learning the energy of {train.size_in_words}")
     fields = [name for name in _SHOWN if shape and name in train and known.learn_field is not None]
 
     def limit(share: float) -> float | None:
@@ -215,9 +221,12 @@ def learn(
         meta["suspects"] = [vars(one) for one in found.suspects]
     if excluded:
         meta["excluded"] = excluded
-    surrogate = Surrogate(energy, {**known.fields, **{k: v.field for k, v in learnt.items()}}, meta=meta)
+    memory, fit = (None, None) if known.memory is None else known.memory(energy)
+    if memory is not None:
+        del meta["solves"]  # a history is none
+    surrogate = Surrogate(energy, {**known.fields, **{k: v.field for k, v in learnt.items()}}, memory, meta)
     spent = time.monotonic() - began
-    return surrogate, LearningHistory(found, solves, spent, learnt, known.filter)
+    return surrogate, LearningHistory(found, solves, spent, learnt, known.filter, memory=fit)
 
 
 def _kept_rows(train: Dataset, leave_out: Sequence[int]) -> tuple[np.ndarray, list[int]]:
@@ -245,10 +254,17 @@ def _learn_answers(
     answers = DatasetAnswers.of(train)
     numbers: dict[str, Fitted] = {}
     fields: dict[str, LearntModes] = {}
+    every = [*(one.values for one in answers.numbers.values()), *(f.values for f in answers.fields.values())]
+    with threadpool_limits(
+        1
+    ):  # one choice for all parts: they leave together, as networks of the same inputs
+        bends = choose_bends(answers.X, [v.reshape(len(v), -1) for v in every], answers.inputs)
     for group, part in answers.numbers.items():
         log(group)
         search = _fit_options(options, budget, len(answers.numbers) + len(answers.fields) - len(numbers))
-        numbers[group] = fit(answers.X, part.values, list(answers.inputs), list(part.outputs), options=search)
+        numbers[group] = fit(
+            *(answers.X, part.values, list(answers.inputs), list(part.outputs)), bends=bends, options=search
+        )
     for shown, one in answers.fields.items():
         log(f"{shown} at {one.places}")
         search = _fit_options(options, budget, len(answers.fields) - len(fields))
@@ -260,6 +276,7 @@ def _learn_answers(
             name=shown,
             unit=one.unit,
             components=one.components,
+            bends=bends,
             options=search,
         )
     meta = {

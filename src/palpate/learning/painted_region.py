@@ -23,7 +23,8 @@ AROUND = 32768  # drawn all over the rest, of which those near the paint count
 NEAR = 1.0  # over the ball's radius: how far from the paint
 MOST = 512  # balls of a region, as many as of any other
 SLACK = 1 / 8  # of the ball's radius: how far beyond the paint a foot may lie; 1 mm of 8 mm
-# Bound on the relative deviation: twice the error at the 95th percentile that studies ask for.
+# Bound on the relative deviation: the force's just noticeable difference, which is what a validation allows at the 95th
+# percentile (`palpate.validation.limits`). A force that is less sure than a hand can tell is not known.
 DEVIATION = 0.07
 # Share of the paint that is trained at least, where the deviation is larger: after few solves it is everywhere.
 LEAST = 0.25

@@ -187,7 +187,7 @@ class PressedSolves:
         if overlap is None:
             return []
         parts = own.law, own.touched, own.probe_radius, None, own.resolved
-        return [OverlapBaseline(*parts, overlap.field(weight), weight) for weight in WEIGHTS]
+        return [OverlapBaseline(*parts, overlap.change(weight), weight) for weight in WEIGHTS]
 
     @property
     def solves(self) -> Solves:

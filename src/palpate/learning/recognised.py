@@ -1,15 +1,15 @@
 """The registry of kinds of datasets that a hand feels: each kind says in its own file how its data is recognised.
 
 A recogniser is a function (dataset, `Request`) → `Recognised`, or None where the dataset is of another kind. Those of
-palpate are entered by `recogniser` where they stand: `bent_body`, `pressed_solves`, `pad_solves`. A baseline that
-`palpate.register_baseline` was given is asked after them.
+palpate are entered by `recogniser` where they stand: `plastic`, `bent_body`, `pressed_solves`, `pad_solves`. A
+baseline that `palpate.register_baseline` was given is asked after them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,10 @@ from palpate.learning.painted_region import PaintedRegion
 from palpate.options import FieldOptions, SearchOptions
 from palpate.surrogates import Baseline, LearntEnergy, NodeField, Solves
 from palpate.surrogates.baselines import registered_baselines
+from palpate.surrogates.memories import Memory
+
+if TYPE_CHECKING:
+    from palpate.learning.plastic import MemoryFit
 
 __all__ = ["Recognised", "Request", "recognise", "recogniser"]
 
@@ -31,6 +35,7 @@ class Request:
     search: SearchOptions
     layout: Layout | None  # of a mesh that is fine wherever the body shall be touched
     options: Mapping[str, Any]  # of the kind, and of learning its energy
+    log: Callable[[str], None] = lambda _: None  # told what begins
 
     def split(self, *names: str) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return the options of these names, and all others."""
@@ -56,6 +61,8 @@ class Recognised:
     rows: np.ndarray | None = (
         None  # converged solve that each of `solves` is, negative for none; None: in order
     )
+    # the memory beside an energy that was learnt, and how well it fits
+    memory: Callable[[LearntEnergy], tuple[Memory, MemoryFit]] | None = None
 
 
 Recogniser = Callable[[Dataset, Request], Recognised | None]

@@ -51,6 +51,7 @@ _WAYS = {
 }
 _PARTS = ("factors", "shifts", "weights", "tail")
 _SCALES = ("input_centre", "input_half", "output_centre", "output_scale")
+_BEND = "input_bend"  # an array of a network whose inputs' scales are bent
 _EXTRA = "extra/"
 _KEYS = {"inputs": list, "outputs": list, "meta": dict}
 _KEYS_SINCE_2 = {"radial": str, "basis": bool, "extras": list}
@@ -187,6 +188,8 @@ def network_to_json(network: Network) -> tuple[dict[str, Any], dict[str, np.ndar
     parts = {k: getattr(network, k) for k in _PARTS} | {k: getattr(network.scaling, k) for k in _SCALES}
     if network.basis is not None:
         parts["basis"] = network.basis
+    if network.scaling.is_bent:
+        parts[_BEND] = network.scaling.input_bend
     arrays = {k: np.ascontiguousarray(v, dtype=np.float64) for k, v in parts.items()}
     arrays |= {_EXTRA + k: np.ascontiguousarray(v) for k, v in network.extras.items()}
     description = {
@@ -210,7 +213,7 @@ def _network_from_json(
     names = {*_PARTS, *_SCALES, *(["basis"] if description["basis"] else [])}
     extras = {k.removeprefix(_EXTRA): v for k, v in arrays.items() if k.startswith(_EXTRA)}
     plain = {k: v for k, v in arrays.items() if not k.startswith(_EXTRA)}
-    if plain.keys() != names or sorted(extras) != description["extras"]:
+    if plain.keys() - {_BEND} != names or sorted(extras) != description["extras"]:
         raise ValueError(f"its arrays are {sorted(arrays)}, which is not what a network has")
     for name, array in plain.items():
         if array.dtype != np.float64:
@@ -222,7 +225,7 @@ def _network_from_json(
         shifts=plain["shifts"],
         weights=plain["weights"],
         tail=plain["tail"],
-        scaling=Scaling(*(plain[k] for k in _SCALES)),
+        scaling=Scaling(*(plain[k] for k in _SCALES), plain.get(_BEND)),  # type: ignore[arg-type]
         meta=description["meta"],
         radial=description["radial"],
         basis=plain.get("basis"),

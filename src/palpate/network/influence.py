@@ -37,7 +37,7 @@ class Influence:
         tail = 1 + len(network.inputs)
         count, s = len(self.missed), network.scaling
         names = tuple(Quantity(f"sample {p}") for p in range(count))
-        plain = Scaling(s.input_centre, s.input_half, np.zeros(count), np.ones(count))
+        plain = Scaling(s.input_centre, s.input_half, np.zeros(count), np.ones(count), s.input_bend)
         G = self.coefficients.T
         shares = replace(
             *(network,),

@@ -38,36 +38,73 @@ __all__ = ["Evaluator", "Network", "Scaling"]
 class Scaling:
     """Affine maps between physical and scaled quantities.
 
-    Inputs: ξ = (x − input_centre)/input_half, in [−1, 1] over the declared ranges. Outputs:
-    y = output_centre + output_scale · η, one scale for a whole group of outputs so that their errors compare.
+    Inputs: ξ = (x − c)/(h + b (x − c)) with centre c, half width h and bend b, in [−1, 1] over the declared ranges.
+    Without a bend this is affine. With the bend of `log_bends` equal ratios of x are about equal steps of ξ; unlike a
+    logarithm it is exact arithmetic on every machine. Outputs: y = output_centre + output_scale · η, one scale for a
+    whole group of outputs so that their errors compare.
 
     Attributes
     ----------
     input_centre, input_half : (n,)
-        Middle and half width of each input's range, in its unit.
+        Value of each input at ξ = 0, and its change there by ξ, in its unit; without a bend middle and half width of
+        its range.
     output_centre, output_scale : (m,)
         Zero and unit of each scaled output, in its unit.
+    input_bend : (n,), optional
+        b of each input, between −1 and 1; by default zero. Far outside of the range, where the denominator falls below
+        h / (2 (1 + |b|)), it stays at that, so that ξ is finite everywhere.
     """
 
     input_centre: np.ndarray
     input_half: np.ndarray
     output_centre: np.ndarray
     output_scale: np.ndarray
+    input_bend: np.ndarray = None  # type: ignore[assignment]  # zeros, see __post_init__
+
+    def __post_init__(self) -> None:
+        if self.input_bend is None:
+            object.__setattr__(self, "input_bend", np.zeros(np.shape(self.input_half)))
 
     @classmethod
     def of(
-        cls, inputs: Sequence[Range], Y: np.ndarray, *, scale: float | np.ndarray | None = None
+        cls,
+        inputs: Sequence[Range],
+        Y: np.ndarray,
+        *,
+        scale: float | np.ndarray | None = None,
+        bends: np.ndarray | None = None,
     ) -> Scaling:
-        """Scaling from declared ranges and training outputs Y (N, m), one scale for all of them or one each."""
+        """Scaling from declared ranges and training outputs Y (N, m), one scale for all of them or one each.
+
+        `bends` (n,) are those of the inputs, by default zero.
+        """
         low, high = bounds(inputs)
         centre = Y.mean(axis=0)
         size = scale if scale is not None else float(np.abs(Y - centre).max())
         sizes = np.broadcast_to(np.where(np.asarray(size) > 0, size, 1.0), Y.shape[1:]).astype(float)
-        return cls((low + high) / 2, (high - low) / 2, centre, sizes)
+        b = np.zeros(len(low)) if bends is None else np.asarray(bends, float)
+        middle, half = ((low + high) - b * (high - low)) / 2, (high - low) / 2 * (1.0 - b**2)
+        return cls(middle, half, centre, sizes, b)
+
+    @property
+    def is_bent(self) -> bool:
+        """True where an input's scale is not affine."""
+        return bool(np.any(self.input_bend))
 
     def scale_inputs(self, X: np.ndarray) -> np.ndarray:
         """Physical inputs (…, n) to scaled ones."""
-        return np.asarray((X - self.input_centre) / self.input_half)
+        far = X - self.input_centre
+        return np.asarray(far / self._denominators(far))
+
+    def unscale_inputs(self, xi: np.ndarray) -> np.ndarray:
+        """Scaled inputs (…, n), which are in [−1, 1] or not far outside, to physical ones."""
+        return np.asarray(self.input_centre + self.input_half * xi / (1.0 - self.input_bend * xi))
+
+    def _denominators(self, far: np.ndarray) -> np.ndarray:
+        """Return h + b (x − c), no less than h / (2 (1 + |b|)), of offsets x − c (…, n)."""
+        least = self.input_half / (2.0 * (1.0 + np.abs(self.input_bend)))
+        bent = np.maximum(self.input_half + self.input_bend * far, least)
+        return np.where(self.input_bend == 0.0, self.input_half, bent)
 
     def scale_outputs(self, Y: np.ndarray) -> np.ndarray:
         """Physical outputs (…, m) to scaled ones."""
@@ -76,7 +113,8 @@ class Scaling:
     def select(self, outputs: slice | Sequence[int]) -> Scaling:
         """The scaling of some of the outputs."""
         rows = outputs if isinstance(outputs, slice) else list(outputs)
-        return Scaling(self.input_centre, self.input_half, self.output_centre[rows], self.output_scale[rows])
+        outer = self.output_centre[rows], self.output_scale[rows]
+        return Scaling(self.input_centre, self.input_half, *outer, self.input_bend)
 
 
 _DOUBLE = np.dtype(np.float64)

@@ -14,7 +14,7 @@ After their own arguments all kernels take the parts that `Network.compiled` ret
              [1, latent outputs] and its n derivatives
     steps    the same memory as integers
     layout   (1 + e, 2): the radial function's place in `RADIAL_FUNCTIONS`; row and column of A's entries, row by row
-    scales   (2, n): centre and half width of each input, always in double precision
+    scales   (3, n): centre, half width and bend of each input, always in double precision
     units    (e + r, h): entries of the factors, then shifts
     rows     (1 + n + h, k): constant, slopes and weights of the k latent outputs
     modes    (1 + k, m): offset and output modes; (0, 0) where the latent outputs are the outputs
@@ -93,7 +93,7 @@ def packed(network: Network, precision: Precision) -> tuple[np.ndarray, ...]:
     kind = _TYPES[precision][0]
     return (
         np.ascontiguousarray(layout, dtype=np.int64),
-        np.ascontiguousarray([s.input_centre, s.input_half], dtype=np.float64),
+        np.ascontiguousarray([s.input_centre, s.input_half, s.input_bend], dtype=np.float64),
         *(np.ascontiguousarray(a, dtype=kind) for a in (units, rows, modes)),
         constants(kind),
     )
@@ -182,12 +182,38 @@ def _many(z, rows, y) -> None:
 
 
 @part
+def _denominator(far, i, scales) -> float:
+    """h + b (x − c) of input i at the offset x − c, as `Scaling.scale_inputs` has it."""
+    h, b = scales[1, i], scales[2, i]
+    if b == 0.0:
+        return float(h)
+    return float(max(h + b * far, h / (2.0 * (1.0 + abs(b)))))
+
+
+@part
+def _scaled(x, i, scales) -> float:
+    """ξ of input i at x."""
+    far = x - scales[0, i]
+    return float(far / _denominator(far, i, scales))
+
+
+@part
+def _scaled_slope(x, i, scales) -> tuple[float, float]:
+    """∂ξ/∂x and ∂²ξ/∂x² of input i at x."""
+    h, b, far = scales[1, i], scales[2, i], x - scales[0, i]
+    d = _denominator(far, i, scales)
+    if b == 0.0 or d > h + b * far:  # affine, everywhere or far outside of the range
+        return 1.0 / d, 0.0
+    return h / (d * d), -2.0 * b * h / (d * d * d)
+
+
+@part
 def _regress(x, line, work, steps, layout, scales, units, constants, order) -> None:
     """Fill a line of work with [1, ξ, φ]; A ξ − b and the radial function's derivatives stay in work."""
     n, h, count = x.size, units.shape[1], layout.shape[0] - 1
     work[line, 0] = 1.0
     for i in range(n):
-        work[line, 1 + i] = (x[i] - scales[0, i]) / scales[1, i]
+        work[line, 1 + i] = _scaled(x[i], i, scales)
     for k in range(h):
         work[Q, k] = 0.0
     e = 0
@@ -206,7 +232,7 @@ def _regress(x, line, work, steps, layout, scales, units, constants, order) -> N
 
 
 @part
-def _slopes(line, work, layout, scales, units) -> None:
+def _slopes(x, line, work, layout, scales, units) -> None:
     """Fill the n lines after `line` with the derivatives of [1, ξ, φ] by x; needs `_regress` with order 1."""
     n, h = scales.shape[1], units.shape[1]
     for i in range(n):
@@ -218,7 +244,7 @@ def _slopes(line, work, layout, scales, units) -> None:
             work[target, 1 + n + k] += units[e, k] * work[row, k]
     for i in range(n):
         target = line + 1 + i
-        work[target, 1 + i] = 1.0 / scales[1, i]
+        work[target, 1 + i] = _scaled_slope(x[i], i, scales)[0]
         turn = work[target, 1 + i]  # in the precision of the work
         turn += turn  # dq/dξ = 2 Aᵀ (A ξ − b)
         for k in range(h):
@@ -287,7 +313,7 @@ def jacobian_into(x, J, work, steps, layout, scales, units, rows, modes, constan
         return False
     line, latent = _places(work, layout, scales, units)
     _regress(x, line, work, steps, layout, scales, units, constants, 1)
-    _slopes(line, work, layout, scales, units)
+    _slopes(x, line, work, layout, scales, units)
     _gradients(J, line, latent, work, rows, modes)
     return True
 
@@ -300,7 +326,7 @@ def value_and_jacobian_into(x, y, J, work, steps, layout, scales, units, rows, m
     line, latent = _places(work, layout, scales, units)
     _regress(x, line, work, steps, layout, scales, units, constants, 1)
     _output(y, line, latent, 1, work, rows, modes)
-    _slopes(line, work, layout, scales, units)
+    _slopes(x, line, work, layout, scales, units)
     _gradients(J, line, latent, work, rows, modes)
     return True
 
@@ -327,8 +353,9 @@ def hessian_into(x, H, one, slopes, work, steps, layout, scales, units, rows, mo
     if x.size != scales.shape[1]:
         return False
     n = x.size
-    line, _ = _places(work, layout, scales, units)
+    line, latent = _places(work, layout, scales, units)
     _regress(x, line, work, steps, layout, scales, units, constants, 1)
+    _slopes(x, line, work, layout, scales, units)
     H[:] = 0.0
     for k in range(units.shape[1]):
         weight = rows[1 + n + k, 0]
@@ -342,8 +369,12 @@ def hessian_into(x, H, one, slopes, work, steps, layout, scales, units, rows, mo
             for j in range(n):
                 H[i, j] += weight * one[i, j]
     for i in range(n):
+        step, bent = _scaled_slope(x[i], i, scales)
         for j in range(n):
-            H[i, j] /= scales[1, i] * scales[1, j]
+            H[i, j] *= step * _scaled_slope(x[j], j, scales)[0]
+        if bent != 0.0:  # ∂f/∂ξ ∂²ξ/∂x², the slope being known by x
+            _output(slopes[:1], line + 1 + i, latent + 1 + i, 0, work, rows, modes)
+            H[i, i] += slopes[0] / step * bent
     return True
 
 
@@ -352,10 +383,11 @@ def gram(network: Network, q: int) -> np.ndarray:
 
     Networks of several outputs, with a basis, or of fewer than q inputs are refused.
     """
-    if len(network.outputs) != 1 or network.basis is not None or not 1 <= q <= len(network.inputs):
+    bent = network.scaling.is_bent
+    if bent or len(network.outputs) != 1 or network.basis is not None or not 1 <= q <= len(network.inputs):
         raise UsageError(
             f"Curvature by {q} inputs is not to be had from {network}.",
-            why="It is of one output, without modes, and by inputs that exist.",
+            why="It is of one output, without modes or bent scales, and by inputs that exist.",
             fix="Pick one output: network.select([0]).",
         )
     A = network.factors[:, :, :q]
@@ -423,5 +455,5 @@ def regressors_into(x, work, steps, layout, scales, units, rows, modes, constant
     """[1, ξ, φ] at x (n,) into one line of work, its n derivatives by x into the next; the line's number."""
     line, _ = _places(work, layout, scales, units)
     _regress(x, line, work, steps, layout, scales, units, constants, 1)
-    _slopes(line, work, layout, scales, units)
+    _slopes(x, line, work, layout, scales, units)
     return int(line)

@@ -83,14 +83,14 @@ class _Memory:
 def _parts_of(network: Network) -> tuple[np.ndarray, ...]:
     """The arrays of a network that travel, in order."""
     s = network.scaling
-    scales = (s.input_centre, s.input_half, s.output_centre, s.output_scale)
+    scales = (s.input_centre, s.input_half, s.output_centre, s.output_scale, s.input_bend)
     own = (network.factors, network.shifts, network.weights, network.tail, *scales)
     return own if network.basis is None else (*own, network.basis)
 
 
 def _shapes_of(n: int, m: int, h: int, r: int, k: int, basis: int) -> tuple[tuple[int, ...], ...]:
     """Shapes of `_parts_of`."""
-    own = ((h, r, n), (h, r), (k, h), (k, 1 + n), (n,), (n,), (m,), (m,))
+    own = ((h, r, n), (h, r), (k, h), (k, 1 + n), (n,), (n,), (m,), (m,), (n,))
     return (*own, (m, k)) if basis else own
 
 
@@ -292,9 +292,9 @@ class Subscriber:
             shifts=shifts,
             weights=weights,
             tail=tail,
-            scaling=Scaling(*(np.array(s) for s in scales[:4])),
+            scaling=Scaling(*(np.array(s) for s in scales[:5])),
             radial=RADIAL_FUNCTIONS[radial],
-            basis=scales[4] if basis else None,
+            basis=scales[5] if basis else None,
         )
 
     @property

@@ -10,7 +10,7 @@ from palpate.errors import UsageError
 from palpate.units import bounds
 
 if TYPE_CHECKING:
-    from palpate.network.network import Network
+    from palpate.network.network import Network, Scaling
 
 __all__ = ["check_shapes", "flaw", "unreal"]
 
@@ -34,7 +34,10 @@ def check_shapes(network: Network) -> None:
         "weights": (network.weights.shape, (latent, h)),
         "tail": (network.tail.shape, (latent, 1 + n)),
         "basis": ((m, latent) if network.basis is None else network.basis.shape, (m, max(latent, 1))),
-        "input scales": ((np.shape(s.input_centre), np.shape(s.input_half)), ((n,), (n,))),
+        "input scales": (
+            tuple(map(np.shape, (s.input_centre, s.input_half, s.input_bend))),
+            ((n,), (n,), (n,)),
+        ),
         "output scales": ((np.shape(s.output_centre), np.shape(s.output_scale)), ((m,), (m,))),
     }
     for name, (found, wanted) in shapes.items():
@@ -63,6 +66,7 @@ def unreal(network: Network) -> str:
         "tail": network.tail,
         "input centres": s.input_centre,
         "input half widths": s.input_half,
+        "input bends": s.input_bend,
         "output centres": s.output_centre,
         "output scales": s.output_scale,
         "basis": np.zeros(0) if network.basis is None else network.basis,
@@ -72,6 +76,8 @@ def unreal(network: Network) -> str:
             return f"its {name} are not all finite numbers"
     if not (np.greater(s.input_half, 0).all() and np.greater(s.output_scale, 0).all()):
         return "its scales are not all positive"
+    if not (np.abs(s.input_bend) < 1.0).all():
+        return "its inputs are bent by one or more, so that their scale has an end in their range"
     return ""
 
 
@@ -83,7 +89,7 @@ def _largest(network: Network) -> float:
     one = np.concatenate([[1.0], reach])
     latent = np.abs(network.tail) @ one + np.abs(network.weights).sum(axis=1)
     outputs = latent if network.basis is None else np.abs(network.basis) @ latent
-    steep = max(1.0, float(np.abs(network.factors).max(initial=0.0))) / s.input_half.min()
+    steep = max(1.0, float(np.abs(network.factors).max(initial=0.0))) / _least_step(s)
     found = [
         distance.max(initial=0.0),
         (latent * steep).max(),
@@ -91,3 +97,8 @@ def _largest(network: Network) -> float:
         (np.abs(s.output_centre) + s.output_scale * outputs * max(1.0, steep)).max(),
     ]
     return float(np.max(found))  # not-a-number where one is
+
+
+def _least_step(scaling: Scaling) -> float:
+    """Return a bound on the change of an input by its scaled one, inside the range: h / (1 + |b|)²."""
+    return float((scaling.input_half / (1.0 + np.abs(scaling.input_bend)) ** 2).min())

@@ -18,7 +18,6 @@ from dataclasses import replace
 
 from palpate.network import shared_memory
 from palpate.runtime.touchable import Touchable
-from palpate.surrogates import NodeField
 
 __all__ = ["hand_over", "prepared", "take"]
 
@@ -31,7 +30,7 @@ _AT_ONCE = 32  # pages that are touched in one piece
 
 def prepared(body: Touchable) -> Touchable:
     """Return what a loop needs of a body, without the fields of surfaces, and with all that takes long worked out."""
-    lines = {name: shown for name, shown in body.fields.items() if isinstance(shown, NodeField)}
+    lines = {name: shown for name, shown in body.fields.items() if shown.carrier == "line"}
     slim = replace(body, fields=lines, meta={})
     _ = slim.stiffness_max, slim.force_max, slim.deepest, slim.away, slim.reach
     slim.evaluator()

@@ -24,7 +24,8 @@ from palpate.devices import device_traits
 from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
-from palpate.surrogates import FieldSurrogate, ModalField, NodeField, Surrogate, TouchedSurface
+from palpate.surrogates import Field, LearntEnergy, NodeField, Surrogate, TouchedSurface
+from palpate.surrogates.fields import line_of
 from palpate.surrogates.memories import Memory
 from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.surrogate import correction_count, correction_warning
@@ -43,9 +44,9 @@ _NEAR = 32  # rows near the middle of the ranges that are answered before all ot
 class Touchable:
     """An energy that a hand can feel, with all that follows from it for that hand."""
 
-    energy: Any  # what the hand feels, a LearntEnergy: force and stiffness, depth, trained region
+    energy: LearntEnergy  # what the hand feels: force and stiffness, depth, trained region
     # what the eye sees; may be empty
-    fields: Mapping[str, FieldSurrogate | NodeField] = field(default_factory=dict)
+    fields: Mapping[str, Field] = field(default_factory=dict)
     name: str = "body"  # of the body, as pages and reports call it
     memory: Memory | None = None  # what it remembers of how it was touched
     meta: Mapping[str, Any] = field(default_factory=dict)  # what the file says of its making
@@ -68,7 +69,7 @@ class Touchable:
     @property
     def surface(self) -> TouchedSurface | None:
         """The touched surface at rest, where a free probe touches one; otherwise None."""
-        return self.energy.baseline.surface  # type: ignore[no-any-return]
+        return self.energy.baseline.surface
 
     @property
     def holds(self) -> bool:
@@ -83,8 +84,7 @@ class Touchable:
     @property
     def line(self) -> NodeField | None:
         """The displacement of a body that is drawn as a line of nodes, of which a hand holds one; otherwise None."""
-        shown = self.fields.get("displacement")
-        return shown if isinstance(shown, NodeField) else None
+        return line_of(self.fields)
 
     @property
     def stays(self) -> bool:
@@ -329,7 +329,7 @@ def touchable(model: Surrogate, name: str = "") -> Touchable:
         known += f", corrected by {touches} touches" + (
             " with a warning" if correction_warning(model.meta) else ""
         )
-    fields = {name: shown for name, shown in model.fields.items() if not isinstance(shown, ModalField)}
+    fields = {name: shown for name, shown in model.fields.items() if shown.carrier != "places"}
     return Touchable(model.hand_energy, fields, known, model.memory, model.meta)
 
 

@@ -140,10 +140,9 @@ def _compile_body(body: Surrogate) -> None:
     network.predict(np.zeros((FEW + 1, len(network.inputs))))
     TrainedRegion.of(np.random.default_rng(0).uniform(-1.0, 1.0, (20, len(network.inputs))))
     touchable(body).evaluator()
-    for field in body.fields.values():
-        if isinstance(field, FieldSurrogate):
-            field.surface.at(np.zeros((FEW + 1, 3)))
-            field.evaluator()
+    for field in body.surface_fields.values():
+        field.surface.at(np.zeros((FEW + 1, 3)))
+        field.evaluator()
 
 
 def rod() -> Surrogate:

@@ -1,9 +1,10 @@
 """Study: the whole way, from the body to the touch, as one declared, frozen record.
 
 study                the record: a body, what acts on it, and the tables of its stages
-body_records         `[body]`          interaction_records   `[interaction]`, `[memory]`, `[[varied]]`
+body_records         `[body]`          loads_kind, probe_kind, pad_kind, memory_kind   what acts on it, with its tables
 material_records     materials         part_records          `[body]` of a part, and names for its surfaces
-stage_records        `[sweep]`, `[test]`, `[filter]`, `[learning]`, `[target]`, `[runtime]`
+stage_records        the registry of the tables of each kind, and what several kinds share; `[runtime]`
+interaction_records  what acts on a surface, and `[[varied]]`
 quantities           frozen tables with quantities that may carry units
 toml                 the record as a TOML file with comments, and back
 named_studies        studies that have a name

@@ -15,6 +15,7 @@ from palpate.improvement import ImprovementStep, improve
 from palpate.improvement.improve import Interest
 from palpate.options import ImprovementOptions, takes
 from palpate.study.mesh_check import load_finer, mesh_part, solve_finer
+from palpate.study.probe_kind import ProbeSweepRecord
 from palpate.study.run import (
     Log,
     Outcome,
@@ -26,7 +27,6 @@ from palpate.study.run import (
     validate_study,
     with_validation,
 )
-from palpate.study.stage_records import ProbeSweepRecord
 from palpate.study.study import Study
 from palpate.study.study_advice import earlier_curve
 from palpate.sweeps import local_cluster
@@ -101,7 +101,7 @@ def conclude(study: Study, paths: Paths, step: ImprovementStep) -> Outcome:
     validation = validate_study(study, step.surrogate, test, step.history, load_finer(study, paths))
     surrogate = step.surrogate
     origin = surrogate.meta.get("dataset", {})
-    if step.phase != "solved" and isinstance(train, Dataset) and origin.get("hash") != train.hash:
+    if step.phase != "solved" and origin.get("hash") != train.hash:
         # a surrogate of all solves was learnt, and was worse; this one of fewer has not seen the unseen ones either
         surrogate = replace(
             surrogate, meta={**surrogate.meta, "dataset": {**origin, "no_better": train.hash}}

@@ -17,7 +17,8 @@ from palpate.files import restore_folder, write_file
 from palpate.format import count, millimetres, share
 from palpate.physics.solid.finer_problem import FINER, finer_problem
 from palpate.processes import CASE_LIMIT
-from palpate.study.stage_records import ProbeSweepRecord, ProbeTestRecord, TouchTargetRecord
+from palpate.study.probe_kind import ProbeSweepRecord, ProbeTestRecord
+from palpate.study.stage_records import TouchTargetRecord
 from palpate.study.study import Study
 from palpate.study.study_paths import Paths
 from palpate.sweeps import sweep
@@ -83,9 +84,18 @@ def refine_study(
 
     A few touches are solved on its elements and on those half as large. The error goes with the square of the size, so
     the size follows from it; elements that are fine enough stay, and none becomes smaller than half.
+
+    Raises
+    ------
+    UsageError
+        For a study in which no ball touches.
     """
     if not isinstance(study.sweep, ProbeSweepRecord) or not isinstance(study.target, TouchTargetRecord):
-        return study
+        raise UsageError(
+            f"The elements of {study.name} can't be chosen by touches.",
+            why="No ball touches its body.",
+            fix="Leave --element auto out.",
+        )
     problem = study.problem()
     places = problem.design(PILOTS, study.sweep.seed, depths=1)
     options = {"points": places, "cluster": cluster, "progress": progress, "max_failed": 1.0}
@@ -97,8 +107,11 @@ def refine_study(
         log(f"elements of {millimetres(size)} do: the mesh's part is {share(part)}")
         return study
     smaller = float(f"{size * max(FINER, math.sqrt(wanted / part)):.2g}")
+    left = part * (smaller / size) ** 2
     log(
-        f"elements of {millimetres(smaller)}, since the mesh's part is {share(part)} with {millimetres(size)}"
+        f"elements of {millimetres(smaller)}, since the mesh's part is {share(part)} with {millimetres(size)}; about "
+        f"{share(left)} is left"
+        + (", for which the file can ask for smaller ones" if left > 2 * wanted else "")
     )
     document = tomlkit.parse(file.read_text(encoding="utf-8"))
     document.setdefault("sweep", tomlkit.table())["element"] = smaller

@@ -113,7 +113,7 @@ _QUICK: dict[str, Any] = {
         "light_force_p95": 0.10,
         "stiffness_p95": 0.20,
         "direction_p95": 10.0,
-        "mesh_force": 0.10,
+        "mesh_force": 0.20,
         "displacement_mean": 3.5e-4,
         "displacement_max": 2e-3,
         "smoothness": 0.0,

@@ -18,11 +18,11 @@ from palpate.physics.shapes.naming import members
 from palpate.physics.shapes.step_patches import FacePatches
 from palpate.physics.shapes.triangle_list import triangle_text
 from palpate.record_complaints import complaints
-from palpate.study.interaction_records import ProbeRecord
 from palpate.study.material_records import SolidMaterialRecord
 from palpate.study.part_records import PartRecord
 from palpate.study.part_rim import with_rim
 from palpate.study.part_study import COARSE, HELD, TOUCHED, require_suitable_ball
+from palpate.study.probe_kind import ProbeRecord
 from palpate.study.study import Study
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from palpate.errors import UsageError
 from palpate.file_kinds import part_kind
 from palpate.physics.shapes.body_file import FEATURE_ANGLE
 from palpate.physics.shapes.mesh import BodyMesh
-from palpate.study.interaction_records import ProbeRecord
 from palpate.study.part_records import PartRecord
+from palpate.study.probe_kind import ProbeRecord
 from palpate.study.study import Study
 
 __all__ = ["RIM", "contact_radius", "with_rim"]

@@ -19,9 +19,9 @@ from palpate.options import PartOptions, takes
 from palpate.physics.shapes.cad_file import states_unit
 from palpate.physics.shapes.mesh import BodyMesh, Face
 from palpate.record_complaints import complaints
-from palpate.study.interaction_records import ProbeRecord
 from palpate.study.part_records import PartRecord, part_shape
 from palpate.study.part_rim import with_rim
+from palpate.study.probe_kind import ProbeRecord
 from palpate.study.study import Study
 from palpate.study.toml import to_toml
 from palpate.units import parse_quantity

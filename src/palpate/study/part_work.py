@@ -38,8 +38,8 @@ from palpate.errors import PalpateError
 from palpate.file_kinds import part_kind
 from palpate.processes import available_cores, end_by_sigterm, end_group
 from palpate.study.part_records import PartRecord
+from palpate.study.probe_kind import ProbeSweepRecord
 from palpate.study.run import Paths
-from palpate.study.stage_records import ProbeSweepRecord
 from palpate.study.study import Study
 
 __all__ = ["main", "rough_study", "work_on"]

@@ -24,10 +24,10 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning import History, Settings, founding, learn_dataset, node_outputs
 from palpate.learning import learn as learn_samples
-from palpate.learning.learn_dataset import filter_record
-from palpate.learning.plastic import LoadHistories
+from palpate.learning.learn_dataset import LearningHistory, filter_record
+from palpate.learning.loading import load_histories
 from palpate.processes import CASE_LIMIT
-from palpate.study.memory_stages import learn_histories, sweep_histories
+from palpate.study.memory_kind import sweep_histories, with_elastic
 from palpate.study.mesh_check import load_finer, solve_finer
 from palpate.study.relaxation_stage import with_relaxation
 from palpate.study.study import Study
@@ -55,8 +55,8 @@ __all__ = [
 ]
 
 Log = Callable[[str], None]
-Rows: TypeAlias = Dataset | LoadHistories
-"""What was solved: a dataset, or the histories of a body with memory."""
+Record: TypeAlias = LearningHistory | History
+"""Record of learning: all of it, or that of the sequential filter, which a file keeps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +64,11 @@ class Outcome:
     """Result of a study that was carried out."""
 
     study: Study
-    model: Any  # with its errors on unseen solves written into it
-    train: Rows  # solves that were learnt from
-    test: Rows  # solves that were not
+    model: Surrogate  # with its errors on unseen solves written into it
+    train: Dataset  # solves that were learnt from
+    test: Dataset  # solves that were not
     validation: Validation  # figures of the surrogate on the unseen solves
-    history: Any = None  # record of learning
+    history: Record | None = None  # record of learning
     # the founding form of the filter beside ours, by name, for studies with one input
     rivals: Mapping[str, Any] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)  # duration of each stage in s
@@ -102,7 +102,7 @@ def sweep_study(
     progress: Any = True,
     case_limit: float = CASE_LIMIT,
     log: Log = lambda _: None,
-) -> tuple[Rows, Rows | None]:
+) -> tuple[Dataset, Dataset | None]:
     """Solve the study's design, and what is solved for testing only.
 
     Datasets are written to `paths` as they grow, and an interrupted sweep goes on where it stopped. A solve has
@@ -113,8 +113,8 @@ def sweep_study(
     if study.sweep is None or study.test is None:
         train, test = sweep_histories(study, problem)
         if paths is not None:
-            train.save(paths.histories)
-            test.save(paths.unseen_histories)
+            train.save(paths.data, overwrite=True)
+            test.save(paths.random, overwrite=True)
         return train, test
     with contextlib.ExitStack() as stack:
         if cluster is None:
@@ -150,17 +150,17 @@ def _solved_part(study: Study, problem: Any) -> str:
     return f"; the body is symmetric, so only a part of it is touched, and a solve stands for up to {images} places"
 
 
-def load_data(study: Study, paths: Paths) -> tuple[Rows, Rows]:
+def load_data(study: Study, paths: Paths) -> tuple[Dataset, Dataset]:
     """Read the training and the unseen rows of a study from its files.
 
     Files of another body or of other loads are refused: the study was changed since they were solved.
     """
-    if study.sweep is None or study.test is None:
-        return LoadHistories.load(paths.histories), LoadHistories.load(paths.unseen_histories)
+    if study.test is None and not paths.data.exists() and paths.histories.exists():
+        return load_histories(paths.histories), load_histories(paths.unseen_histories)
     problem = study.problem()
     # compared as the file has it: tuples are lists there
     wanted = json.loads(json.dumps(problem.describe()))
-    further = paths.random if study.test.arguments(problem) is not None else None
+    further = None if study.test is not None and study.test.arguments(problem) is None else paths.random
     parts = []
     for path in filter(None, (paths.data, further)):
         parts.append(Dataset.open(path))
@@ -173,14 +173,11 @@ def load_data(study: Study, paths: Paths) -> tuple[Rows, Rows]:
     return split_rows(study, parts[0], parts[1] if further else None)
 
 
-def split_rows(study: Study, data: Rows, further: Rows | None) -> tuple[Rows, Rows]:
+def split_rows(study: Study, data: Dataset, further: Dataset | None) -> tuple[Dataset, Dataset]:
     """Split what was solved into training rows and rows that the network never sees."""
-    if not isinstance(data, Dataset) or study.test is None:
-        assert further is not None  # histories for testing are always made
-        return data, further
     good = data.ok
-    parts = [further.ok] if isinstance(further, Dataset) else []
-    if study.test.every:
+    parts = [] if further is None else [further.ok]
+    if study.test is not None and study.test.every:
         unseen = _unseen_rows(study, len(good), study.test.every)
         parts.insert(0, good.take(np.flatnonzero(unseen)))
         good = good.take(np.flatnonzero(~unseen))
@@ -209,43 +206,42 @@ def _unseen_rows(study: Study, count: int, every: int) -> np.ndarray:
 
 def learn_study(
     study: Study,
-    train: Rows,
-    test: Rows | None = None,
+    train: Dataset,
+    test: Dataset | None = None,
     *,
     progress: Callable[[int, int], None] | None = None,
     log: Log = lambda _: None,
     watch: Any = None,
     leave_out: Sequence[int] = (),
     on_step: Log = lambda _: None,
-) -> tuple[Any, Any]:
+) -> tuple[Surrogate, LearningHistory]:
     """Learn the study's surrogate, which keeps the study's runtime settings.
 
     Rows of `test` are only watched while a filter learns; `progress` counts its observations, and `watch` (a
     GrowthRecorder) keeps frames of a sequential filter's growth. Rows of `train` numbered in `leave_out` are not learnt
-    from. `on_step` is told each step of the search for the energy. Returns what `palpate.learn` returns, and for a
-    body with memory how well it fits.
+    from. `on_step` is told each step of the search for the energy. Returns what `palpate.learn` returns.
     """
-    if watch is not None and (study.filter is None or not isinstance(train, Dataset)):
+    if watch is not None and study.filter is None:
         raise UsageError(
             f"No network of the study {study.name!r} grows sample by sample.",
             why="Its energy is found by a search among many networks at once.",
             fix="Watch a study of a beam under loads, such as that of palpate init --preset beam-nylon.",
         )
-    if isinstance(train, Dataset):
-        options = _options(study, train, test, progress, log) | ({} if watch is None else {"watch": watch})
-        model, history = learn_dataset(train, leave_out=leave_out, on_step=on_step, **options)
-        model = with_relaxation(study, model, log)
-    elif leave_out:
+    if leave_out and study.memory is not None:
         raise UsageError(
             f"The study {study.name!r} learns from histories, of which none can be left out.",
             fix="Omit --leave-out.",
         )
-    else:
-        model, history = learn_histories(study, train)
+    options = _options(study, train, test, progress, log) | ({} if watch is None else {"watch": watch})
+    whole = with_elastic(study, train)
+    model, history = learn_dataset(whole, leave_out=leave_out, on_step=on_step, **options)
+    model = with_relaxation(study, model, log)
+    if whole is not train:  # it is recognised by what its file holds
+        model = _with_meta(model, {"dataset": model.meta["dataset"] | {"hash": train.hash}})
     return _with_meta(model, {"runtime": study.runtime.model_dump()}), history
 
 
-def _options(study: Study, train: Dataset, test: Any, progress: Any, log: Log) -> dict[str, Any]:
+def _options(study: Study, train: Dataset, test: Dataset | None, progress: Any, log: Log) -> dict[str, Any]:
     """Return the options of `palpate.learn` for a study."""
     options: dict[str, Any] = {"name": study.name, **(study.learning.options() if study.learning else {})}
     if study.filter:
@@ -258,13 +254,13 @@ def _options(study: Study, train: Dataset, test: Any, progress: Any, log: Log) -
     return {**options, "log": log}
 
 
-def _with_meta(model: Any, more: Mapping[str, Any]) -> Any:
+def _with_meta(model: Surrogate, more: Mapping[str, Any]) -> Surrogate:
     """Return what was learnt with more said of it, for whoever opens the file later."""
     return replace(model, meta={**model.meta, **more})
 
 
 def validate_study(
-    study: Study, model: Any, test: Rows, history: Any = None, finer: Dataset | None = None
+    study: Study, model: Surrogate, test: Dataset, history: Record | None = None, finer: Dataset | None = None
 ) -> Validation:
     """Judge what was learnt by solves that it has never seen, by the study's targets.
 
@@ -275,8 +271,8 @@ def validate_study(
 
 
 def with_validation(
-    model: Any, validation: Validation, curve: Sequence[Mapping[str, Any]] = (), solves: int = 0
-) -> Any:
+    model: Surrogate, validation: Validation, curve: Sequence[Mapping[str, Any]] = (), solves: int = 0
+) -> Surrogate:
     """Return what was learnt with its errors on unseen solves written into it.
 
     `curve` is the learning curve of the surrogate that it replaces; `solves` is the number that it was learnt from,
@@ -288,14 +284,14 @@ def with_validation(
     return _with_meta(model, more)
 
 
-def save_model(paths: Paths, model: Any, history: Any) -> None:
+def save_model(paths: Paths, model: Surrogate, history: Record | None) -> None:
     """Write what was learnt, and the record of its filter where there is one."""
     model.save(paths.model)
     if (own := filter_record(history)) is not None:
         own.save(paths.history)
 
 
-def load_model(paths: Paths, train: Rows) -> tuple[Any, Any]:
+def load_model(paths: Paths, train: Dataset) -> tuple[Surrogate, History | None]:
     """Read what was learnt, and the record of its filter where there is one.
 
     It was learnt from just these rows, or from the first of them where all of them gave no better one: then the
@@ -305,7 +301,8 @@ def load_model(paths: Paths, train: Rows) -> tuple[Any, Any]:
     """
     model = Surrogate.load(paths.model)
     origin = model.meta.get("dataset", {})
-    if isinstance(train, Dataset) and train.hash not in (origin.get("hash"), origin.get("no_better")):
+    # a body with memory of before does not tell its histories
+    if origin and train.hash not in (origin.get("hash"), origin.get("no_better")):
         raise UsageError(
             f"{paths.model} was learnt from other solves than this study trains with.",
             why="The sweep or its split was changed since, and what is unseen here may have been seen there.",
@@ -367,7 +364,7 @@ def carry_out(
     return Outcome(study, model, train, test, validation, history, others, timings)
 
 
-def _rivals(study: Study, train: Any, test: Any, passes: int) -> dict[str, History]:
+def _rivals(study: Study, train: Dataset, test: Dataset, passes: int) -> dict[str, History]:
     """Return runs of the founding form and ours, as they are and ten times tighter, for studies of one input."""
     if len(train.ranges) != 1 or study.filter is None:
         return {}

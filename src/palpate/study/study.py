@@ -13,32 +13,28 @@ from palpate.physics import BodyFamily, Varied
 from palpate.record_complaints import complaints
 from palpate.records import Record
 from palpate.study.body_records import BodyRecord, CantileverRecord
-from palpate.study.interaction_records import InteractionRecord, MemoryRecord, VariedRecord
-from palpate.study.stage_records import (
-    SECTIONS,
+from palpate.study.interaction_records import VariedRecord
+from palpate.study.loads_kind import (
     FilterRecord,
-    HistoryTargetRecord,
     LoadLearningRecord,
+    LoadsRecord,
     LoadSweepRecord,
     LoadTargetRecord,
     LoadTestRecord,
-    PadLearningRecord,
-    PadSweepRecord,
-    PadTestRecord,
-    ProbeLearningRecord,
-    ProbeSweepRecord,
-    ProbeTestRecord,
-    RuntimeRecord,
-    TouchTargetRecord,
 )
+from palpate.study.memory_kind import HistoryTargetRecord, MemoryRecord
+from palpate.study.pad_kind import PadRecord, PadSweepRecord, PadTestRecord
+from palpate.study.probe_kind import ProbeLearningRecord, ProbeRecord, ProbeSweepRecord, ProbeTestRecord
+from palpate.study.stage_records import SECTIONS, EnergyLearningRecord, RuntimeRecord, TouchTargetRecord
 
-__all__ = ["Study"]
+__all__ = ["InteractionRecord", "Study"]
 
 _TABLES = ("sweep", "test", "filter", "learning", "target")
 
+InteractionRecord: TypeAlias = LoadsRecord | ProbeRecord | PadRecord
 Sweep: TypeAlias = LoadSweepRecord | ProbeSweepRecord | PadSweepRecord
 Test: TypeAlias = LoadTestRecord | ProbeTestRecord | PadTestRecord
-Learning: TypeAlias = LoadLearningRecord | ProbeLearningRecord | PadLearningRecord
+Learning: TypeAlias = LoadLearningRecord | ProbeLearningRecord | EnergyLearningRecord
 Target: TypeAlias = LoadTargetRecord | TouchTargetRecord | HistoryTargetRecord
 
 

@@ -8,8 +8,7 @@ from typing import Any
 
 from palpate.dataset import Dataset
 from palpate.errors import PalpateError
-from palpate.study.run import Paths, Rows
-from palpate.study.stage_records import PadSweepRecord, ProbeSweepRecord
+from palpate.study.run import Paths
 from palpate.study.study import Study
 from palpate.surrogates import Surrogate
 from palpate.validation import Validation
@@ -29,10 +28,9 @@ def earlier_curve(paths: Paths, name: str) -> Sequence[Mapping[str, Any]]:
     return tuple(meta.get("learning_curve", ())) if meta.get("name") == name else ()
 
 
-def advice_after(study: Study, model: Any, train: Rows, validation: Validation, file: Path) -> str:
+def advice_after(study: Study, model: Surrogate, train: Dataset, validation: Validation, file: Path) -> str:
     """Return a sentence on how many solves would keep the limits; empty where more solves can't be added or help."""
-    grows = isinstance(study.sweep, ProbeSweepRecord | PadSweepRecord)
-    if not grows or not isinstance(train, Dataset):
+    if study.sweep is None or not study.sweep.grows:
         return ""
-    curve = getattr(model, "meta", {}).get("learning_curve", ())
+    curve = model.meta.get("learning_curve", ())
     return advice_on_solves(validation, len(train), curve, f"palpate sweep {file} --samples")

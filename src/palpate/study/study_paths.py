@@ -37,12 +37,12 @@ class Paths:
 
     @property
     def histories(self) -> Path:
-        """Histories from which a body with memory is learnt."""
+        """Histories from which a body with memory is learnt, as an earlier version wrote them."""
         return self.folder / f"{self.name}-histories.palpate"
 
     @property
     def unseen_histories(self) -> Path:
-        """Histories of a body with memory for testing only."""
+        """Histories for testing only, as an earlier version wrote them."""
         return self.folder / f"{self.name}-unseen.palpate"
 
     @property

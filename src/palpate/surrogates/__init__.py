@@ -34,6 +34,7 @@ from palpate.surrogates.energy_evaluator import EnergyEvaluator
 from palpate.surrogates.energy_kernels import Compiled
 from palpate.surrogates.fields import (
     AxisPlaces,
+    Field,
     FieldEvaluator,
     FieldSurrogate,
     MeshPlaces,
@@ -55,6 +56,7 @@ __all__ = [
     "ContactLaw",
     "Continuation",
     "EnergyEvaluator",
+    "Field",
     "FieldEvaluator",
     "FieldSurrogate",
     "Followed",

@@ -214,6 +214,11 @@ class LearntEnergy:
         """Return ∂F/∂x (N, 3, 3), symmetric, N/m; a body that resists has negative eigenvalues."""
         return self._answers(X)[1][:, STIFFNESS].reshape(-1, 3, 3).copy()
 
+    def response(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return energy (N,), force (N, 3) and stiffness (N, 3, 3) together, in the time of one of them."""
+        _, answers, _ = self._answers(X)
+        return answers[:, 0].copy(), answers[:, FORCE].copy(), answers[:, STIFFNESS].reshape(-1, 3, 3).copy()
+
     def depth(self, X: np.ndarray) -> np.ndarray:
         """Return the baseline's own coordinate s (N,), m: a probe's depth, negative without contact, or a pad's way."""
         return self._answers(X)[1][:, 1].copy()

@@ -13,14 +13,16 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from palpate.errors import UsageError
 from palpate.format import count, millimetres, share
 from palpate.input_words import input_in_words
 from palpate.surrogates.card_text import bullets, escape_markdown, html_page, html_record, rows
 from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.units import Range
+
+if TYPE_CHECKING:
+    from palpate.surrogates.surrogate import Surrogate
 
 __all__ = ["FORMAT_VERSION", "NOT_STATED", "ModelCard", "card_of", "suspect_sentences"]
 
@@ -139,19 +141,9 @@ def _input_label(entry: Mapping[str, Any]) -> str:
     return name if words == name else f"{words} ({name})"
 
 
-def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard:
-    """Return the card of a learnt body, a network, or what `palpate.fit` made; other values are refused.
-
-    The SHA-256 of its file, if that is given, goes into the card.
-    """
-    network = getattr(model, "network", model)
-    if not (hasattr(model, "can_be_touched") or hasattr(network, "outputs")):
-        raise UsageError(
-            f"A value of kind {type(model).__name__} has no model card.",
-            why="Learnt bodies and networks have one.",
-            fix="Name the .palpate file that `palpate learn` or `palpate fit` has written.",
-        )
-    meta = _record(getattr(model, "meta", None) or getattr(network, "meta", None))
+def card_of(surrogate: Surrogate, file: str | os.PathLike[str] | None = None) -> ModelCard:
+    """Return the card of a surrogate; the SHA-256 of its file, if that is given, goes into the card."""
+    meta = _record(surrogate.meta)
     origin = _record(meta.get("dataset"))
     provenance = _record(origin.get("provenance"))
     hashes = {
@@ -159,10 +151,7 @@ def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard
         "dataset": origin.get("hash") or _record(meta.get("training")).get("hash"),
         "configuration": provenance.get("config_hash"),
     }
-    if hasattr(model, "can_be_touched"):
-        parts = _of_body(model, meta) if model.can_be_touched else _of_answers(model, meta)
-    else:
-        parts = _of_network(network, meta)
+    parts = (_of_body if surrogate.can_be_touched else _of_answers)(surrogate, meta)
     inputs: Sequence[Range] = parts.pop("inputs")
     answers = {
         "inputs": [asdict(r) for r in inputs],
@@ -181,7 +170,7 @@ def card_of(model: Any, file: str | os.PathLike[str] | None = None) -> ModelCard
     )
 
 
-def _of_body(body: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
+def _of_body(body: Surrogate, meta: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the card of a learnt body says that no network's does."""
     correction = _record(meta.get("correction"))
     errors = {
@@ -232,7 +221,7 @@ def suspect_sentences(suspects: Sequence[Any]) -> list[str]:
     return sentences
 
 
-def _of_answers(surrogate: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
+def _of_answers(surrogate: Surrogate, meta: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the card of a surrogate that no hand feels says of its numbers and fields."""
     choice, validation = _record(meta.get("choice")), meta.get("validation")
     errors = {
@@ -260,28 +249,6 @@ def _of_answers(surrogate: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
             *(f"{n} ({f.unit or '1'})" for n, f in surrogate.fields.items()),
         ],
         "inside": "; ".join(map(str, parts)) if network is None else f"{count(network.units, 'unit')}{plain}",
-        "trained_on": {"columns of inputs": choice.get("columns")},
-        "errors": _drop_empty(errors),
-        "limits": _DATA_LIMITS,
-        "warnings": tuple(warnings),
-    }
-
-
-def _of_network(network: Any, meta: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the card of a network of data says; `palpate.fit` records its choice and its error."""
-    choice, n, m = _record(meta.get("choice")), len(network.inputs), len(network.outputs)
-    errors = {
-        "error on samples held out, relative to the outputs' spread": choice.get("heldout"),
-        _LEVEL: choice.get("level"),
-    }
-    warnings = [str(note) for note in choice.get("notes", ())]
-    if choice.get("heldout") is None:
-        warnings.append("It was not checked on samples that it has not seen, or the file does not say so.")
-    return {
-        "kind": f"A network learnt from data: {count(n, 'input')}, {count(m, 'output')}.",
-        "inputs": network.inputs,
-        "outputs": [f"{q.name} ({q.unit or '1'})" for q in network.outputs],
-        "inside": f"{count(network.units, 'unit')}, {choice.get('form') or network.form}, {network.radial}",
         "trained_on": {"columns of inputs": choice.get("columns")},
         "errors": _drop_empty(errors),
         "limits": _DATA_LIMITS,

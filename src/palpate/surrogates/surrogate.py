@@ -24,7 +24,15 @@ from palpate.network import Network, load_archive
 from palpate.network.codec import load_value, save_value
 from palpate.page_hook import page_of
 from palpate.surrogates.energy import LearntEnergy
-from palpate.surrogates.fields import FieldSurrogate, ModalField, NodeField
+from palpate.surrogates.fields import (
+    Field,
+    FieldSurrogate,
+    ModalField,
+    NodeField,
+    line_of,
+    modal_fields,
+    surface_fields,
+)
 from palpate.surrogates.learnt_quantities import LearntQuantities
 from palpate.surrogates.memories import Memory, Patches
 from palpate.surrogates.model_card import ModelCard, card_of
@@ -48,7 +56,7 @@ class Surrogate:
     ----------
     energy : LearntEnergy, optional
         Energy, force and stiffness, and whether they may be trusted; None where no hand feels it.
-    fields : mapping of name to FieldSurrogate, NodeField or ModalField
+    fields : mapping of name to Field
         What is drawn of it, of the same inputs: on a touched surface, at nodes that loads move, or of any physics at
         places of a mesh or of an axis; may be empty.
     memory : Memory, optional
@@ -68,7 +76,7 @@ class Surrogate:
     """
 
     energy: LearntEnergy | None = None
-    fields: Mapping[str, FieldSurrogate | NodeField | ModalField] = field(default_factory=dict)
+    fields: Mapping[str, Field] = field(default_factory=dict)
     memory: Memory | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
     quantities: Mapping[str, LearntQuantities] = field(default_factory=dict)
@@ -103,19 +111,27 @@ class Surrogate:
                 why="It has no energy, no fields and no quantities.",
                 fix="Give at least one of them; `palpate.learn` and `palpate.fit` make them.",
             )
-        loads = any(isinstance(shown, NodeField) for shown in self.fields.values())
-        if not loads and any(other != names[0] for other in names[1:]):
+        alike = all(shown.asked_as_body for shown in self.fields.values())
+        if alike and any(other != names[0] for other in names[1:]):
             raise UsageError(
                 "The parts of this surrogate have different inputs.",
                 why=" / ".join(", ".join(name for name, _ in part) for part in names),
                 fix="Learn energy, fields and quantities from the same solves.",
             )
 
-    def _parts(self) -> Iterator[LearntEnergy | FieldSurrogate | NodeField | ModalField | LearntQuantities]:
+    def _parts(self) -> Iterator[LearntEnergy | Field | LearntQuantities]:
         """Yield everything that answers inputs, the energy first."""
         yield from () if self.energy is None else (self.energy,)
         yield from self.quantities.values()
         yield from self.fields.values()
+
+    @classmethod
+    def of(cls, learnt: Surrogate | Network, name: str = "network") -> Surrogate:
+        """Return a surrogate as it is, and a network alone as a surrogate of that name, whose quantities it answers."""
+        if not isinstance(learnt, Network):
+            return learnt
+        meta = {"name": name, **learnt.meta}
+        return cls(meta=meta, quantities={"outputs": LearntQuantities(learnt)})
 
     def __str__(self) -> str:
         head = f"Surrogate {self.name!r}: {self.purpose}{_training(self.meta)}{self._remembers}"
@@ -145,7 +161,7 @@ class Surrogate:
         """The numbers and fields that a surrogate without touch answers."""
         numbers = [q.name for q in self.outputs]
         more = f" and {len(numbers) - _NAMED} more" if len(numbers) > _NAMED else ""
-        curves = [name for name, shown in self.fields.items() if _is_curve(shown)]
+        curves = [name for name, shown in self.fields.items() if shown.is_curve]
         fields = [name for name in self.fields if name not in curves]
         words = [", ".join(numbers[:_NAMED]) + more] if numbers else []
         for noun, names in (("curve", curves), ("field", fields)):
@@ -199,6 +215,21 @@ class Surrogate:
         return tuple(q for part in self.quantities.values() for q in part.outputs)
 
     @property
+    def surface_fields(self) -> dict[str, FieldSurrogate]:
+        """The fields on the touched surface, by name."""
+        return surface_fields(self.fields)
+
+    @property
+    def modal_fields(self) -> dict[str, ModalField]:
+        """The fields and curves of any physics, by name."""
+        return modal_fields(self.fields)
+
+    @property
+    def line(self) -> NodeField | None:
+        """The displacement of a body that is drawn as a line of nodes; None of any other."""
+        return line_of(self.fields)
+
+    @property
     def plain_network(self) -> Network:
         """The network, where the surrogate is one group of quantities and nothing else.
 
@@ -231,9 +262,8 @@ class Surrogate:
 
     def trusted(self, X: np.ndarray) -> np.ndarray:
         """Return which of X (N, n) are like what was learnt from, by every part of the surrogate, (N,) bool."""
-        answers = [
-            part.trusted(X) for part in self._parts() if isinstance(part, ModalField | LearntQuantities)
-        ]
+        answers = [part.trusted(X) for part in self.quantities.values()]
+        answers += [shown.trusted(X) for shown in self.fields.values() if shown.asked_as_body]
         answers += [] if self.energy is None else [self.energy.inside(X)]
         return np.asarray(np.all(answers, axis=0)) if answers else np.ones(len(X), dtype=bool)
 
@@ -279,10 +309,7 @@ class Surrogate:
         """
         surface, shown = energy.baseline.surface, dict(self.fields)
         if surface is not None:
-            shown = {
-                k: replace(v, surface=surface) if isinstance(v, FieldSurrogate) else v
-                for k, v in shown.items()
-            }
+            shown = {name: part.with_surface(surface) for name, part in shown.items()}
         return replace(self, energy=energy, fields=shown, meta=self.meta if meta is None else meta)
 
     def with_memory(self, memory: Memory | None, *, spacing: float | None = None) -> Surrogate:
@@ -325,8 +352,8 @@ class Surrogate:
 
     def _patches(self, spacing: float) -> Patches:
         """Return places of the touched surface, of the size that a typical press has."""
-        shown, baseline = next(iter(self.fields.values()), None), self.hand_energy.baseline
-        if not isinstance(shown, FieldSurrogate) or baseline.surface is None:
+        shown, baseline = next(iter(self.surface_fields.values()), None), self.hand_energy.baseline
+        if shown is None or baseline.surface is None:
             raise UsageError(
                 "This body has no drawn surface to keep a memory on.",
                 why="Places that remember are laid out over the mesh of a field.",
@@ -392,10 +419,6 @@ class Surrogate:
                 fix="Learn it again from its solves: `palpate learn STUDY.toml`, or pp.learn(data)[0].save(file).",
             )
         return load_value(path, cls, kind=KIND, noun="a learnt body")
-
-
-def _is_curve(shown: object) -> bool:
-    return isinstance(shown, ModalField) and shown.is_curve
 
 
 def _training(meta: Mapping[str, Any]) -> str:

@@ -11,10 +11,12 @@
     cluster.py     worker processes on this machine; worker.py is the process
     ledger.py      finished parts of an interrupted sweep, on disk
     grow_sweep.py  a finished sweep that is asked for more samples
+    solve_histories.py  histories of one load, for a body with memory; drives.py makes their loads
 
     command_problem.py  a problem that another program solves, once for each case
     template_files.py   its input files, made of templates; program_run.py starts and ends it
     umbridge_problem.py a problem that a model of UM-Bridge solves
+    mapped_problem.py   what these two share
     answer_files.py     answers of a case, kept until the sweep is whole
 """
 
@@ -30,6 +32,7 @@ from palpate.sweeps.problem import (
     Resettable,
     Solver,
 )
+from palpate.sweeps.solve_histories import HistoryProblem, solve_histories
 from palpate.sweeps.space import DESIGNS, Design, Space, grid, random, sobol
 from palpate.sweeps.sweep import sweep
 
@@ -41,6 +44,7 @@ __all__ = [
     "Design",
     "Designed",
     "ExternalProblem",
+    "HistoryProblem",
     "LocalCluster",
     "OnDemandCluster",
     "Problem",
@@ -54,5 +58,6 @@ __all__ = [
     "local_cluster",
     "random",
     "sobol",
+    "solve_histories",
     "sweep",
 ]

@@ -9,26 +9,23 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-import math
 import os
 import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from palpate.dataset import Field, Layout
 from palpate.dataset.readers.case_results import read_case
 from palpate.dataset.readers.mapping import ImportMapping
 from palpate.errors import PalpateError, SolverError, UsageError
 from palpate.files import system_errors
 from palpate.supervised import ChildEnded, run_in_child
 from palpate.sweeps.answer_files import SavedCase
-from palpate.sweeps.problem import Answer
+from palpate.sweeps.mapped_problem import CaseFailure, MappedProblem, MappedSolver
 from palpate.sweeps.program_run import OUTPUT, last_lines, run_program
 from palpate.sweeps.space import Space, random
 from palpate.sweeps.template_files import TemplateFiles, fill_words
@@ -44,7 +41,7 @@ _SAME_PLACE = 1e-6  # distance over the body's size that is rounding of coordina
 
 
 @dataclass(frozen=True)
-class CommandProblem:
+class CommandProblem(MappedProblem):
     """A problem that another program solves, started without a shell in a folder of its own for each case.
 
     The first case, in the middle of the ranges, says what the others look like: its mesh is that of the dataset. A case
@@ -75,62 +72,41 @@ class CommandProblem:
         """Return what a worker gets: it reads the first case from its file."""
         return {name: value for name, value in self.__dict__.items() if name != "first"}
 
-    @property
-    def words(self) -> str:
-        """Name of the body."""
-        return self.mapping.name
-
-    @property
-    def layout(self) -> Layout:
-        """Nodes and surface of the first case."""
-        return self.first.layout
-
-    @property
-    def schema(self) -> tuple[Field, ...]:
-        """Fields that the mapping names, with the sizes of the first case."""
-        return self.first.fields
-
-    def describe(self) -> dict[str, Any]:
-        """Return everything that decides the answers, as plain data: templates by their hashes."""
-        return self._description
-
-    @functools.cached_property
-    def _description(self) -> dict[str, Any]:
-        mapping = self.mapping
-        body = {"type": "imported", "name": mapping.name, "mirrored": mapping.mirrored, **mapping.body}
+    def source(self) -> dict[str, Any]:
+        """Return what decides the answers besides the mapping: templates by their hashes."""
         return {
-            "body": body,
-            "interactions": [dict(entry) for entry in mapping.interactions],
-            "solver": {
-                "command": list(self.command),
-                "templates": self.templates.hashes(),
-                "raw": list(self.templates.raw),
-                "digits": self.templates.digits,
-                "results": list(self.results),
-                "solution": self.solution,
-                "failure": list(self.failure),
-                "constants": {name: list(value) for name, value in self.constants.items()},
-                "mapping": mapping.model_dump(mode="json", by_alias=True, exclude_defaults=True),
-                "environment": dict(self.environment),
-            },
+            "command": list(self.command),
+            "templates": self._hashes,
+            "raw": list(self.templates.raw),
+            "digits": self.templates.digits,
+            "results": list(self.results),
+            "solution": self.solution,
+            "failure": list(self.failure),
+            "constants": {name: list(value) for name, value in self.constants.items()},
+            "environment": dict(self.environment),
         }
 
     @functools.cached_property
+    def _hashes(self) -> dict[str, str]:
+        """Hashes of the templates when the sweep began."""
+        return self.templates.hashes()
+
+    @functools.cached_property
     def _identity(self) -> bytes:
-        return hashlib.sha256(json.dumps(self._description, sort_keys=True).encode()).digest()
+        return hashlib.sha256(json.dumps(self.describe(), sort_keys=True).encode()).digest()
 
-    def chains(self, points: np.ndarray) -> list[np.ndarray]:
-        """Return each row of `points` (N, n) as a chain of its own: no solve starts from another."""
-        return [np.array([row]) for row in range(len(points))]
-
-    def open(self) -> _CommandSolver:
+    def open(self) -> MappedSolver:
         """Make a solver; templates that were changed since the sweep began are refused."""
-        if self.templates.hashes() != self._description["solver"]["templates"]:
+        if self.templates.hashes() != self._hashes:
             raise UsageError(
                 f"The templates in {self.templates.folder} were changed during the sweep.",
                 fix="Sweep again under another name, or put them back.",
             )
-        return _CommandSolver(self)
+        return MappedSolver(self)
+
+    def values(self, x: np.ndarray) -> Mapping[str, np.ndarray]:
+        """Return the answers for the inputs `x` (n,), of the program unless an earlier run has them."""
+        return self.solve_once(x, self.first).values
 
     def shown_command(self) -> str:
         """Return the command as a person would type it, with the folder that it is started in."""
@@ -184,7 +160,7 @@ class CommandProblem:
         for x in [space.from_unit(np.full(len(space), 0.5)), *random(space, _FIRST_TRIES - 1, seed=0)]:
             try:
                 saved = run_in_child(_solve_first, self, x, limit=self.limit + READING)
-            except (ChildEnded, _CaseFailure) as error:
+            except (ChildEnded, CaseFailure) as error:
                 failures.append(f"{_shown(self.ranges, x)}: {error.what}\n{error.why}".rstrip())
                 continue
             saved.save(path)
@@ -263,15 +239,11 @@ def _require_inside(name: str) -> None:
         )
 
 
-class _CaseFailure(SolverError):
-    """A case that has no answer; its words become the message of its row."""
-
-
-def _failure_of(reason: str, folder: Path) -> _CaseFailure:
+def _failure_of(reason: str, folder: Path) -> CaseFailure:
     lines = last_lines(folder / OUTPUT)
     said = "".join(f"\n    {line}" for line in lines)
     end = f"The last lines of its output:{said}" if lines else "It printed nothing."
-    return _CaseFailure(f"{reason[0].upper()}{reason[1:]}.", why=f"{end}\nIts folder is {folder}")
+    return CaseFailure(f"{reason[0].upper()}{reason[1:]}.", why=f"{end}\nIts folder is {folder}")
 
 
 def _solve_first(problem: CommandProblem, x: np.ndarray) -> SavedCase:
@@ -280,23 +252,6 @@ def _solve_first(problem: CommandProblem, x: np.ndarray) -> SavedCase:
 
 def _shown(ranges: Sequence[Range], x: np.ndarray) -> str:
     return ", ".join(f"{r.name} = {v:.6g} {r.unit}".rstrip() for r, v in zip(ranges, x, strict=True))
-
-
-@dataclass(frozen=True)
-class _CommandSolver:
-    problem: CommandProblem
-
-    def reset(self) -> None:
-        """Forget earlier cases, of which nothing is kept anyway."""
-
-    def solve(self, x: np.ndarray) -> Answer:
-        """Run the program for the inputs `x` (n,), unless an earlier run has its answers."""
-        defaults: dict[str, Any] = {"iterations": 0, "residual": math.nan}
-        try:
-            saved = self.problem.solve_once(x, self.problem.first)
-        except _CaseFailure as error:
-            return SimpleNamespace(converged=False, message=f"{error.what}\n{error.why}", **defaults)
-        return SimpleNamespace(converged=True, message="solved", **defaults, **saved.values)
 
 
 def _differences(first: SavedCase, other: SavedCase) -> Iterator[str]:

@@ -8,23 +8,22 @@ from __future__ import annotations
 
 import functools
 import json
-import math
+import time
 import urllib.error
 import urllib.parse
 import urllib.request
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from palpate.dataset import Field, Layout
 from palpate.dataset.readers.case_results import read_numbers
 from palpate.dataset.readers.import_results import MappedCases
 from palpate.dataset.readers.mapping import ImportMapping
 from palpate.errors import PalpateError, ResourceError, UsageError
-from palpate.sweeps.problem import Answer
+from palpate.sweeps.answer_files import SavedCase
+from palpate.sweeps.mapped_problem import CaseFailure, MappedProblem
 from palpate.units import Range
 
 __all__ = ["UMBridgeProblem"]
@@ -32,10 +31,12 @@ __all__ = ["UMBridgeProblem"]
 _LARGEST = 256_000_000  # bytes of an answer
 _LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})  # reached without a proxy
 _QUICK = 30.0  # s for questions that need no solve
+_PAUSES = (0.5, 2.0, 5.0)  # s before the tries after a lost connection
+_AFTER = "Start it again, and sweep under another name: a case that failed is not solved anew."
 
 
 @dataclass(frozen=True)
-class UMBridgeProblem:
+class UMBridgeProblem(MappedProblem):
     """A problem that asks a server of UM-Bridge; a case that the server can't answer becomes a row with its reason."""
 
     ranges: tuple[Range, ...]
@@ -47,44 +48,25 @@ class UMBridgeProblem:
     config: Mapping[str, Any] = field(default_factory=dict)  # settings that the model takes
     limit: float = 3600.0  # time in s of one solve
 
-    @property
-    def words(self) -> str:
-        """Name of the body."""
-        return self.mapping.name
-
-    @property
-    def layout(self) -> Layout:
-        """One point: numbers have no place."""
-        return self._zeros.layout
-
-    @property
-    def schema(self) -> tuple[Field, ...]:
-        """Fields that the mapping names."""
-        return self._zeros.fields
-
-    def describe(self) -> dict[str, Any]:
-        """Return what decides the answers, as plain data."""
-        mapping = self.mapping
-        body = {"type": "imported", "name": mapping.name, "mirrored": mapping.mirrored, **mapping.body}
+    def source(self) -> dict[str, Any]:
+        """Return what decides the answers besides the mapping."""
         return {
-            "body": body,
-            "interactions": [dict(entry) for entry in mapping.interactions],
-            "solver": {
-                "url": self.url,
-                "model": self.model,
-                "config": dict(self.config),
-                "units": [list(unit) for unit in self.units],
-                "mapping": mapping.model_dump(mode="json", by_alias=True, exclude_defaults=True),
-            },
+            "url": self.url,
+            "model": self.model,
+            "config": dict(self.config),
+            "units": [list(unit) for unit in self.units],
         }
 
-    def chains(self, points: np.ndarray) -> list[np.ndarray]:
-        """Return each row of `points` (N, n) as a chain of its own."""
-        return [np.array([row]) for row in range(len(points))]
-
-    def open(self) -> _UMBridgeSolver:
-        """Make a solver."""
-        return _UMBridgeSolver(self)
+    def values(self, x: np.ndarray) -> Mapping[str, np.ndarray]:
+        """Return the answers of the server for the inputs `x` (n,)."""
+        try:
+            cases = self.mapped(x, self._patiently(x))
+        except PalpateError as error:
+            after = _AFTER * isinstance(error, ResourceError)
+            raise CaseFailure(" ".join(filter(None, (error.what, error.why, after)))) from error
+        if not bool(cases.finite[0]):
+            raise CaseFailure("The model's answer is not a number.")
+        return {entry.name: cases.answers[entry.name][0] for entry in cases.fields}
 
     def check(self) -> None:
         """Refuse a server that is not there, has no such model, or takes other numbers of inputs."""
@@ -105,9 +87,6 @@ class UMBridgeProblem:
             )
         _ = self.schema  # the mapping fits the outputs
 
-    def tidy(self) -> None:
-        """Leave everything: nothing was kept besides the dataset."""
-
     def shown_command(self) -> str:
         """Return what is asked, for the person who starts the sweep."""
         return f"POST {self.url}/Evaluate, model {self.model!r}"
@@ -121,10 +100,11 @@ class UMBridgeProblem:
         return _sizes(inputs), _sizes(outputs)
 
     @functools.cached_property
-    def _zeros(self) -> MappedCases:
-        """A case whose outputs are zero, which says what the others look like."""
+    def first(self) -> SavedCase:
+        """A case whose outputs are zero, which says what the others look like: numbers have no place."""
         middle = np.array([(r.low + r.high) / 2 for r in self.ranges])
-        return self.mapped(middle, [[0.0] * size for size in self.sizes[1]])
+        cases = self.mapped(middle, [[0.0] * size for size in self.sizes[1]])
+        return SavedCase(cases.layout, cases.fields, {})
 
     def mapped(self, x: np.ndarray, output: Sequence[Sequence[float]]) -> MappedCases:
         """Return the answers that output vectors mean for the inputs `x` (n,)."""
@@ -149,6 +129,17 @@ class UMBridgeProblem:
             return [[float(value) for value in part] for part in output]
         except (TypeError, ValueError) as error:
             raise UsageError("The model's answer holds what is no number.", why=str(error)) from error
+
+    def _patiently(self, x: np.ndarray) -> list[list[float]]:
+        """Return the model's answer at `x` (n,); a server that is started again within seconds costs nothing."""
+        for pause in _PAUSES:
+            try:
+                return self.evaluate(x)
+            except ResourceError as error:
+                if isinstance(error.__cause__, TimeoutError):  # it has had its time
+                    raise
+                time.sleep(pause)
+        return self.evaluate(x)
 
     def _ask(self, path: str, question: Mapping[str, Any] | None, limit: float) -> dict[str, Any]:
         """Return the server's answer; what it refuses is a `UsageError`, a lost connection a `ResourceError`."""
@@ -198,24 +189,3 @@ def _sizes(value: Any) -> list[int]:
     if isinstance(value, list) and all(isinstance(size, int) and size >= 0 for size in value):
         return value
     raise UsageError("The server states no sizes of the model's vectors.", why=f"It says {value!r}.")
-
-
-@dataclass(frozen=True)
-class _UMBridgeSolver:
-    problem: UMBridgeProblem
-
-    def reset(self) -> None:
-        """Forget earlier cases, of which nothing is kept anyway."""
-
-    def solve(self, x: np.ndarray) -> Answer:
-        """Ask the server for the inputs `x` (n,)."""
-        defaults: dict[str, Any] = {"iterations": 0, "residual": math.nan}
-        try:
-            cases = self.problem.mapped(x, self.problem.evaluate(x))
-        except PalpateError as error:
-            message = " ".join(filter(None, (error.what, error.why)))
-            return SimpleNamespace(converged=False, message=message, **defaults)
-        values = {entry.name: cases.answers[entry.name][0] for entry in cases.fields}
-        if not bool(cases.finite[0]):
-            return SimpleNamespace(converged=False, message="The model's answer is not a number.", **defaults)
-        return SimpleNamespace(converged=True, message="solved", **defaults, **values)

@@ -8,26 +8,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import cast
 
 import numpy as np
 
-from palpate.dataset import Dataset
+from palpate.dataset import Dataset, is_history
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning import History
 from palpate.learning.bent_body import hand_coordinates
 from palpate.learning.learn_dataset import LearningHistory, filter_record
-from palpate.learning.plastic import LoadHistories
 from palpate.network import TrainedRegion
-from palpate.surrogates import LearntEnergy, NodeField, Surrogate
-from palpate.surrogates.baselines import ToolBaseline
-from palpate.surrogates.fields.field_surrogate import FieldSurrogate
+from palpate.surrogates import Field, FieldSurrogate, LearntEnergy, LearntQuantities, NodeField, Surrogate
 from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
 
-__all__ = ["Subject", "hand_inputs", "line_of"]
+__all__ = ["Subject", "hand_inputs"]
 
 SEEN = 1e-9  # distance in scaled inputs, within which a solve was trained on and is no test
 RADIUS = 1e-9  # relative difference of radii that are the same
@@ -50,7 +47,7 @@ class Subject:
     field: FieldSurrogate | None = None  # the displacement that is shown
     loads: Surrogate | None = None  # networks that answer by load
     body: Surrogate | None = None  # a body with memory
-    histories: LoadHistories | None = None  # unseen, of that body
+    histories: Dataset | None = None  # unseen, of that body
     answering: Surrogate | None = None  # a surrogate that no hand feels, judged by its numbers and fields
     history: History | None = None  # record of the sequential filter
     refined: TouchSolves | None = None  # on a refined mesh
@@ -61,8 +58,8 @@ class Subject:
     @classmethod
     def of(
         cls,
-        model: Any,
-        test: Any,
+        model: Surrogate | TouchFunction,
+        test: Dataset | TouchSolves,
         *,
         history: History | LearningHistory | None = None,
         refined: Dataset | TouchSolves | None = None,
@@ -70,40 +67,43 @@ class Subject:
         seed: int = 0,
     ) -> Subject:
         """Return a model with the rows of a test that it has not seen; for the parameters see `validate`."""
-        if isinstance(model, Surrogate) and not model.can_be_touched:
-            return _by_answers(model, test)
-        line = line_of(model)
-        if line is not None and model.memory is not None:
-            if not isinstance(test, LoadHistories):
+        surrogate = model if isinstance(model, Surrogate) else None
+        if surrogate is not None and not surrogate.can_be_touched:
+            return _by_answers(surrogate, _required(test, surrogate.name))
+        line = None if surrogate is None else surrogate.line
+        if surrogate is not None and line is not None:
+            data = _required(test, surrogate.name)
+            if is_history(data) != (surrogate.memory is not None):
                 raise UsageError(
-                    f"A body with memory is judged by load histories, not by {type(test).__name__} {test!r:.60}.",
-                    fix="Give load histories that it was not learnt from: LoadHistories.load(path).",
+                    f"{surrogate.name} is judged by {'solves' if is_history(data) else 'load histories'}.",
+                    why="A body with memory answers to what was done to it before, any other to its loads alone.",
+                    fix="Give the test set of its study.",
                 )
-            return cls(model.name, 0, np.empty((0, 1)), (), body=model, histories=test)
-        if not isinstance(test, Dataset | TouchSolves):
-            raise UsageError(
-                f"A model is judged by solves, not by {type(test).__name__} {test!r:.60}.",
-                fix="Give what `palpate.sweep` returned, `Dataset.open(path)`, or TouchSolves of arrays.",
-            )
-        if line is not None:
-            if not isinstance(test, Dataset) or refined is not None or strokes:
+            if surrogate.memory is not None:
+                return cls(model.name, 0, np.empty((0, 1)), (), body=surrogate, histories=data)
+            if refined is not None or strokes:
                 raise UsageError(
                     "A body that loads bend is judged by a dataset of its study alone.",
                     fix="Give a Dataset, without `refined` and `strokes`.",
                 )
-            return _by_load(model, line, test.ok, filter_record(history), seed)
+            return _by_load(surrogate, line, data.ok, filter_record(history), seed)
         if filter_record(history) is not None:
             raise UsageError("The model of an energy has no history of a filter.", fix="Leave `history` out.")
-        return _by_place(model, test, refined, strokes, seed)
+        return _by_place(model, surrogate, test, refined, strokes, seed)
 
 
-def _by_answers(model: Surrogate, test: Any) -> Subject:
-    """Return a surrogate that answers numbers and fields, with the solves that it was not learnt from."""
-    if not isinstance(test, Dataset):
+def _required(test: Dataset | TouchSolves, name: str) -> Dataset:
+    """Return the dataset that judges a surrogate; an error for anything else."""
+    if not hasattr(test, "provenance"):
         raise UsageError(
-            f"{model.name} is judged by a dataset, not by {type(test).__name__} {test!r:.60}.",
+            f"{name} is judged by a dataset, not by {type(test).__name__} {test!r:.60}.",
             fix="Give what `palpate.sweep` or `palpate.import_results` returned, or `Dataset.open(path)`.",
         )
+    return cast("Dataset", test)
+
+
+def _by_answers(model: Surrogate, test: Dataset) -> Subject:
+    """Return a surrogate that answers numbers and fields, with the solves that it was not learnt from."""
     good = test.ok
     theirs, own = [(r.name, r.unit) for r in good.ranges], [(r.name, r.unit) for r in model.inputs]
     if theirs != own:
@@ -113,10 +113,10 @@ def _by_answers(model: Surrogate, test: Any) -> Subject:
             fix="Test with solves of the same inputs, in the same order and units.",
         )
     seen = np.zeros(len(good), dtype=bool)
-    for part in (*model.quantities.values(), *model.fields.values()):
-        region = getattr(part, "region", getattr(getattr(part, "coefficients", None), "region", None))
-        if region is not None:
-            seen |= region.distances(part.network.scaling.scale_inputs(good.X)) < SEEN
+    parts: list[LearntQuantities | Field] = [*model.quantities.values(), *model.fields.values()]
+    for part in parts:
+        if part.region is not None:
+            seen |= part.region.distances(part.network.scaling.scale_inputs(good.X)) < SEEN
     if seen.all():
         raise UsageError(
             f"{model.name} was learnt from all {len(good)} solves of the test.",
@@ -126,7 +126,7 @@ def _by_answers(model: Surrogate, test: Any) -> Subject:
     notes = [f"{count(int(seen.sum()), 'solve')} left out: learnt from."] if seen.any() else []
     if far := int((~model.trusted(unseen.X)).sum()):
         notes.append(f"{far} of {len(unseen)} are in no training solve's neighbourhood, and not trusted.")
-    units = sum(part.network.units for part in (*model.quantities.values(), *model.fields.values()))
+    units = sum(part.network.units for part in parts)
     return Subject(
         model.name,
         len(unseen),
@@ -140,16 +140,19 @@ def _by_answers(model: Surrogate, test: Any) -> Subject:
 
 
 def _by_place(
-    model: Any, test: Dataset | TouchSolves, refined: Any, strokes: Sequence[TouchSolves], seed: int
+    model: Surrogate | TouchFunction,
+    surrogate: Surrogate | None,
+    test: Dataset | TouchSolves,
+    refined: Dataset | TouchSolves | None,
+    strokes: Sequence[TouchSolves],
+    seed: int,
 ) -> Subject:
     """Return a model whose force is a function of place."""
-    shown = model.fields.get("displacement") if isinstance(model, Surrogate) else None
-    field = shown if isinstance(shown, FieldSurrogate) else None
-    energy = model.energy if isinstance(model, Surrogate) else None
+    field = None if surrogate is None else surrogate.surface_fields.get("displacement")
+    energy = None if surrogate is None else surrogate.energy
     function = TouchFunction.of(model)
-    _refuse_radius(energy, test)
-    solves = TouchSolves.of(test, function.inputs)
-    seen = _seen(model, solves.X)
+    solves = _solves(test, function, energy)
+    seen = _seen(surrogate, solves.X)
     if seen.all():
         raise UsageError(
             f"The surrogate was trained on all {len(solves)} solves, or on mirror images of them.",
@@ -158,9 +161,6 @@ def _by_place(
     if seen.any():
         solves = solves.take(~seen)
     samples = ForceSamples(solves.X[:, :3], solves.force, function.force(solves.X), function.within(solves.X))
-    if refined is not None:
-        _refuse_radius(energy, refined)
-        refined = TouchSolves.of(refined, function.inputs)
     return Subject(
         function.name,
         len(solves),
@@ -170,23 +170,35 @@ def _by_place(
         units=function.units,
         function=function,
         solves=solves,
-        data=test.ok.take(np.flatnonzero(~seen)) if isinstance(test, Dataset) else None,
+        data=solves.data,
         field=field,
-        refined=refined,
+        refined=None if refined is None else _solves(refined, function, energy),
         strokes=strokes,
         seed=seed,
         notes=(*_places(energy, solves), *_notes(samples, int(seen.sum()))),
     )
 
 
-def _seen(model: Any, X: np.ndarray) -> np.ndarray:
+def _solves(test: Dataset | TouchSolves, function: TouchFunction, energy: LearntEnergy | None) -> TouchSolves:
+    """Return solves of a function's body and of its probe; an error for anything else."""
+    if not hasattr(test, "take"):
+        raise UsageError(
+            f"A model is judged by solves, not by {type(test).__name__} {test!r:.60}.",
+            fix="Give what `palpate.sweep` returned, `Dataset.open(path)`, or TouchSolves of arrays.",
+        )
+    solves = TouchSolves.of(test, function.inputs)
+    _refuse_radius(energy, solves.data)
+    return solves
+
+
+def _seen(model: Surrogate | None, X: np.ndarray) -> np.ndarray:
     """Return which of the inputs (N, n) a model was trained on.
 
     A surrogate remembers its training inputs and their images under the body's symmetry, up to 512 of them; one that
     was learnt all over a painted surface has them in its record.
     """
-    energy = model.energy if isinstance(model, Surrogate) else None
-    if energy is None or energy.region is None:
+    energy = None if model is None else model.energy
+    if model is None or energy is None or energy.region is None:
         return np.zeros(len(X), dtype=bool)
     low, high = bounds(energy.inputs)
 
@@ -198,13 +210,13 @@ def _seen(model: Any, X: np.ndarray) -> np.ndarray:
     return np.asarray(region.distances(scale(X)) < SEEN)
 
 
-def _refuse_radius(energy: LearntEnergy | None, data: Dataset | TouchSolves) -> None:
+def _refuse_radius(energy: LearntEnergy | None, data: Dataset | None) -> None:
     """Refuse solves with another probe than the surrogate's."""
-    if energy is None or not isinstance(data, Dataset) or not math.isfinite(energy.baseline.radius):
+    if energy is None or data is None or not math.isfinite(energy.baseline.radius):
         return
     own = energy.baseline.radius
     acting = data.provenance.get("problem", {}).get("interactions", [])
-    tool = energy.baseline.posed if isinstance(energy.baseline, ToolBaseline) else None
+    tool = getattr(energy.baseline, "posed", None)
     tools = [PosedTool.of(a) for a in acting if isinstance(a, dict) and a.get("type") == "SurfaceTool"]
     if any(one != tool for one in tools) or (tool is not None and not tools):
         raise UsageError(
@@ -245,12 +257,6 @@ def _notes(samples: ForceSamples, seen: int) -> list[str]:
             "solve's neighbourhood; more solves bring them nearer."
         )
     return found
-
-
-def line_of(model: Any) -> NodeField | None:
-    """Return the displacement of a body that is drawn as a line of nodes; None of any other."""
-    shown = model.fields.get("displacement") if isinstance(model, Surrogate) else None
-    return shown if isinstance(shown, NodeField) else None
 
 
 def _by_load(

@@ -83,6 +83,8 @@ class TouchSolves:
         U, J; zero without contact.
     stiffness : (N, 3, 3), optional
         ∂F/∂c, N/m; not-a-number where unknown.
+    data : Dataset, optional
+        The rows of the dataset that they are of, in their order.
 
     Raises
     ------
@@ -94,6 +96,7 @@ class TouchSolves:
     force: np.ndarray
     energy: np.ndarray | None = None
     stiffness: np.ndarray | None = None
+    data: Dataset | None = None
 
     def __post_init__(self) -> None:
         for name in ("X", "force", "energy", "stiffness"):
@@ -130,9 +133,9 @@ class TouchSolves:
     def take(self, rows: np.ndarray) -> TouchSolves:
         """Return some of the solves, by a mask or indices."""
         energy = None if self.energy is None else self.energy[rows]
-        return TouchSolves(
-            self.X[rows], self.force[rows], energy, None if self.stiffness is None else self.stiffness[rows]
-        )
+        stiffness = None if self.stiffness is None else self.stiffness[rows]
+        data = None if self.data is None else self.data.take(np.arange(len(self))[rows])
+        return TouchSolves(self.X[rows], self.force[rows], energy, stiffness, data)
 
     @classmethod
     def of(cls, test: Dataset | TouchSolves, inputs: Sequence[Range]) -> TouchSolves:
@@ -150,7 +153,7 @@ class TouchSolves:
             held = pad_solves(test)
             _refuse_inputs([r.name for r in held.inputs], inputs, [r.name for r in inputs])
             known = None if held.stiffness is None else held.stiffness[:, :3, :3]
-            return cls(held.X, held.force[:, :3], held.energy, known)
+            return cls(held.X, held.force[:, :3], held.energy, known, test.ok)
         test = test.ok
         _refuse_inputs([r.name for r in test.ranges], inputs, [r.name for r in inputs])
         if not len(test):
@@ -163,6 +166,7 @@ class TouchSolves:
             test.response[:, :3],
             test.potential_energy if "potential_energy" in test else None,
             test.response_gradient[:, :3, :3] if gradient else None,
+            test,
         )
 
 

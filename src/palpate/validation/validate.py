@@ -12,12 +12,13 @@ from palpate.format import count, criterion_figure
 from palpate.learning import History
 from palpate.learning.learn_dataset import LearningHistory
 from palpate.output_files import json_data
+from palpate.surrogates import Surrogate
 from palpate.surrogates.model_card import suspect_sentences
 from palpate.validation.figures import FIGURES
 from palpate.validation.figures.figure import Figure
 from palpate.validation.limits import CRITERIA, Check, Limits
 from palpate.validation.subject import Subject
-from palpate.validation.unseen_solves import TouchSolves
+from palpate.validation.unseen_solves import TouchFunction, TouchSolves
 
 __all__ = ["ENOUGH", "Validation", "checks", "measure", "validate"]
 
@@ -188,8 +189,8 @@ class Validation:
 
 
 def validate(
-    model: Any,
-    test: Any,
+    model: Surrogate | TouchFunction,
+    test: Dataset | TouchSolves,
     *,
     history: History | LearningHistory | None = None,
     refined: Dataset | TouchSolves | None = None,

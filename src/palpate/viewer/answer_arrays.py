@@ -63,7 +63,7 @@ def _network(network: Network, block: ArrayBlock) -> dict[str, Any]:
     s = network.scaling
     return {
         "radial": network.radial,
-        "inputs": block.add(np.array([s.input_centre, s.input_half])),
+        "inputs": block.add(np.array([s.input_centre, s.input_half, s.input_bend])),
         "outputs": block.add(np.array([s.output_centre, s.output_scale])),
         "factors": block.add(network.factors),
         "shifts": block.add(network.shifts),

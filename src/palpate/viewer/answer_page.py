@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.surrogates import LearntQuantities, MeshPlaces, ModalField, Surrogate
+from palpate.surrogates import AxisPlaces, LearntQuantities, MeshPlaces, ModalField, Surrogate
 from palpate.surrogates.model_card import card_of
 from palpate.units import bounds
 from palpate.viewer.about_record import about_record
@@ -58,18 +58,18 @@ class AnswerPage:
             "groups": groups,
             "solves": _solves(surrogate, main),
         }
-        modal = [f for f in surrogate.fields.values() if isinstance(f, ModalField)]
-        facts["curves"] = [_curve_facts(f, main) for f in modal if f.is_curve]
+        modal = surrogate.modal_fields.values()
+        facts["curves"] = [_curve_facts(f, f.axis, main) for f in modal if f.axis is not None]
         parts: dict[str, str] = {}
         room = LARGEST - sum(map(len, page_statics())) - len(pack(main.to_bytes()))
         drawn: list[dict[str, Any]] = []
         left_out, meshes = [], _Meshes()
         X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
         for shown in modal:
-            if shown.is_curve:
+            if shown.mesh is None:
                 continue
             block = ArrayBlock(f"answers-{len(drawn)}")
-            made = _field_facts(shown, block, meshes, X)
+            made = _field_facts(shown, shown.mesh, block, meshes, X)
             text = "" if made is None else pack(block.to_bytes())
             if made is None or len(text) > room:
                 left_out.append(shown.name)
@@ -122,24 +122,21 @@ def _modes(shown: ModalField, rows: np.ndarray, block: ArrayBlock) -> dict[str, 
         "modes": block.add(shown.modes[:, rows], "f4"),
         "scatter": block.add(shown.scatter[rows], "f4"),
         "widening": None if np.isnan(shown.widening) else shown.widening,
+        "solved": None if shown.solved is None else block.add(shown.solved),
     }
 
 
-def _curve_facts(shown: ModalField, block: ArrayBlock) -> dict[str, Any]:
+def _curve_facts(shown: ModalField, axis: AxisPlaces, block: ArrayBlock) -> dict[str, Any]:
     """Return the facts of a curve."""
-    axis = shown.places
-    assert not isinstance(axis, MeshPlaces)
     facts = _modes(shown, np.arange(len(axis)), block)
     return facts | {"axis": {"name": axis.name, "unit": axis.unit, "values": axis.values.tolist()}}
 
 
 def _field_facts(
-    shown: ModalField, block: ArrayBlock, meshes: _Meshes, X: np.ndarray
+    shown: ModalField, places: MeshPlaces, block: ArrayBlock, meshes: _Meshes, X: np.ndarray
 ) -> dict[str, Any] | None:
     """Return the facts of a field on a mesh; None for one without a surface to draw."""
-    places = shown.places
-    assert isinstance(places, MeshPlaces)
-    if not len(places.triangles) or (places.kind == "cells" and not len(places.cell_of)):
+    if not places.is_surface:
         return None
     nodes = np.unique(places.triangles)
     rows = nodes if places.kind == "nodes" else np.unique(places.cell_of)
@@ -197,10 +194,12 @@ def _scales(shown: ModalField, values: np.ndarray) -> Iterator[dict[str, Any]]:
 
 def _solves(surrogate: Surrogate, block: ArrayBlock) -> dict[str, Any] | None:
     """Return the inputs (N, n) of the solves that were learnt from, where a part holds them."""
+    for shown in surrogate.modal_fields.values():
+        if shown.solved_at is not None:
+            return block.add(shown.solved_at, "f8")
     parts: list[LearntQuantities] = list(surrogate.quantities.values())
-    parts += [f.coefficients for f in surrogate.fields.values() if isinstance(f, ModalField)]
+    parts += [f.coefficients for f in surrogate.modal_fields.values()]
     for part in parts:
         if part.region is not None:
-            s = part.network.scaling
-            return block.add(part.region.points * s.input_half + s.input_centre, "f8")
+            return block.add(part.network.scaling.unscale_inputs(part.region.points), "f8")
     return None

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from palpate.export.check_points import Difference, compare_network
+from palpate.export.answer_network import AnswerNetwork
+from palpate.export.check_answers import compare_answers
+from palpate.export.check_points import Difference
 from palpate.export.wasm_core import WasmCore
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import NodeField, Surrogate
@@ -42,5 +44,7 @@ def compare_line(surrogate: Surrogate, core: WasmCore) -> Difference:
     """Return how far the nodes' values of a page are from palpate at 1,000 inputs."""
     line = touchable(surrogate).line
     assert line is not None
-    network = line.network
-    return compare_network(network, lambda X: (core.predict(X, len(network.outputs)), None)).parts["outputs"]
+    count = len(line.network.outputs)
+    nodes = AnswerNetwork(line.name, (line.network,), (), (), (count,))
+    (difference,) = compare_answers(nodes, lambda X: (core.predict(X, count), None, None)).parts.values()
+    return difference

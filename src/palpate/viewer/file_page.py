@@ -29,6 +29,7 @@ from palpate.runtime.touchable import touchable
 from palpate.surrogates import FieldSurrogate, NodeField, Surrogate
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.viewer.about_record import about_record
+from palpate.viewer.answer_check import compare_page
 from palpate.viewer.answer_page import AnswerPage
 from palpate.viewer.file_document import pack, page_document, page_statics, shuffle_words
 from palpate.viewer.file_line import compare_line, line_facts
@@ -44,6 +45,7 @@ DRAWN_BY_THE_PAGE = (FIELD + 4, FIELD + 6, FIELD + 7)
 LARGEST = 5_000_000  # bytes of a file, beyond which no further field is added
 DEEP = 2.0  # depth at which the body lets go, over the deepest trained depth
 RATE = 60.0  # Hz, rate of the pictures
+_REPORT = "Nothing was written. Report this with the model file."
 _MARGIN = 20_000  # bytes for facts, card and the document around the parts
 MOVED = 0.1  # share of a field's promise, by which rounding a place may move it
 FINEST = 2**-28  # least step of places over the body's size; without a field it is 2**-19
@@ -68,20 +70,22 @@ def export_html(
     """Write a learnt body as NAME.html, and compare what it answers with palpate if wasmtime is installed.
 
     A probe presses the body, a pad holds it, or a hand holds a node of a line; a surrogate that can't be touched has
-    sliders, and its page computes without the core, so that there is nothing to run here. Where the core does not
-    answer as palpate does, nothing is written. `overwrite` replaces files whatever they are; by default those alone
+    sliders, and its page computes without the core: there the parts of the page are read back and asked. Where they do
+    not answer as palpate does, nothing is written. `overwrite` replaces files whatever they are; by default those alone
     that an earlier export wrote.
     """
     require_outputs([path], endings=(".html", ".htm"), overwrite=overwrite)
     if not surrogate.can_be_touched:
         answers = AnswerPage.of(surrogate, Path(path).stem.removesuffix("-page"))
+        told = compare_page(surrogate, answers.parts) if check else None
+        if told is not None:
+            told.require(f"The page of {surrogate.name} does", why="", fix=_REPORT)
         file = write_file(Path(path), with_seal(path, answers.document()))
-        return ExportedPage(file, answers.hash, None, answers.left_out)
+        return ExportedPage(file, answers.hash, told, answers.left_out)
     page = _Page.of(surrogate)
     comparison = page.compare() if check and wasmtime_module() is not None else None
     if comparison is not None:
-        fix = "Nothing was written. Report this with the model file."
-        comparison.require(f"The page of {surrogate.name} does", why="", fix=fix)
+        comparison.require(f"The page of {surrogate.name} does", why="", fix=_REPORT)
     file = write_file(Path(path), with_seal(path, page.text))
     return ExportedPage(file, page.block.hash, comparison, page.left_out)
 

@@ -75,16 +75,19 @@ class PageModel:
         require_ball(body.energy.baseline, "be drawn on a page")
         self.body, self.version = body, version
         self.centre = body.home if centre is None else centre
-        self._drawing: LineDrawing | SurfaceDrawing = (
-            SurfaceDrawing(body) if body.line is None else LineDrawing(body, body.line)
-        )
-        self.surface: Surface | None = getattr(self._drawing, "surface", None)
+        self._line = None if body.line is None else LineDrawing(body, body.line)
+        self._on_surface = SurfaceDrawing(body) if body.line is None else None
+        self.surface: Surface | None = None if self._on_surface is None else self._on_surface.surface
 
     @property
     def drawing(self) -> SurfaceDrawing:
         """The drawing of a body with a surface."""
-        assert isinstance(self._drawing, SurfaceDrawing)
-        return self._drawing
+        assert self._on_surface is not None
+        return self._on_surface
+
+    @property
+    def _drawing(self) -> LineDrawing | SurfaceDrawing:
+        return self._line or self.drawing
 
     @property
     def field_count(self) -> int:
@@ -126,7 +129,7 @@ class PageModel:
             force_max=body.force_max,
             stiffness_max=body.stiffness_max,
             centre=vector(self.centre),
-            line=self._drawing.line if isinstance(self._drawing, LineDrawing) else None,
+            line=None if self._line is None else self._line.line,
             fields=self._drawing.infos,
             pad=self.pad_words,
             remembers="" if body.line is not None else yielding_in_words(body) or str(body.memory or ""),

@@ -16,7 +16,8 @@ import numpy as np
 
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
-from palpate.surrogates import FieldSurrogate, NodeField
+from palpate.surrogates import Field, FieldSurrogate
+from palpate.surrogates.fields import surface_fields
 from palpate.viewer.indentation_drawing import IndentationDrawing
 from palpate.viewer.messages import FieldInfo, Modes, Surface
 from palpate.viewer.surfaces import relief, split, touchable_triangles
@@ -161,9 +162,9 @@ class SurfaceDrawing:
         )
 
 
-def _shown(fields: Mapping[str, FieldSurrogate | NodeField]) -> tuple[FieldSurrogate, ...]:
+def _shown(fields: Mapping[str, Field]) -> tuple[FieldSurrogate, ...]:
     """Return the fields on one set of nodes, the displacement first."""
-    on_surface = [field for field in fields.values() if isinstance(field, FieldSurrogate)]
+    on_surface = list(surface_fields(fields).values())
     moves = [field for field in on_surface if field.rest.shape[1] == 3 and field.unit == "m"]
     ordered = [*moves[:1], *(field for field in on_surface if field not in moves[:1])]
     first = ordered[0].points if ordered else np.zeros((0, 3))

@@ -96,11 +96,11 @@ def write_ensight(path: Path) -> Path:
     return path
 
 
-def write_xdmf(path: Path) -> Path:
-    """XDMF by meshio, with its numbers in the file."""
+def write_xdmf(path: Path, numbers: str = "XML") -> Path:
+    """XDMF by meshio, with its numbers in the file, or as "HDF" in one beside it in the folder of the process."""
     import meshio
 
-    with meshio.xdmf.TimeSeriesWriter(path, data_format="XML") as series:
+    with meshio.xdmf.TimeSeriesWriter(path, data_format=numbers) as series:
         series.write_points_cells(POINTS, [("hexahedron", BRICKS)])
         for time in TIMES:
             series.write_data(time, point_data={"T": temperature(time), "u": displacement(time)})

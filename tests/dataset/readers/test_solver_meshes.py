@@ -43,6 +43,14 @@ def test_nodes_times_and_fields_are_those_of_the_file(name, tmp_path):
         np.testing.assert_allclose(results.columns[key].values, moves[:, :, i], rtol=1e-5, atol=1e-12)
 
 
+def test_xdmf_with_its_numbers_in_hdf5_beside_it(tmp_path, monkeypatch):
+    pytest.importorskip("h5py")  # which writes it, and is no dependency
+    monkeypatch.chdir(tmp_path)
+    results = pp.read_results(write_xdmf(tmp_path / "bricks.xdmf", "HDF"))
+    assert (tmp_path / "bricks.h5").is_file()
+    np.testing.assert_allclose(results.columns["T"].values, np.stack([temperature(time) for time in TIMES]))
+
+
 def test_openfoam_gives_its_cells_and_their_means_at_nodes(tmp_path):
     results = pp.read_results(write_foam(tmp_path / "bricks.foam"))
     assert results.cases == 2

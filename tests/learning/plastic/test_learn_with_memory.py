@@ -8,18 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate.errors import FileFormatError, UsageError
-from palpate.learning.plastic import (
-    LoadHistories,
-    LoadHistory,
-    Press,
-    learn_indentation,
-    learn_with_memory,
-    random_times,
-    random_turns,
-)
+from palpate.dataset import Dataset, Layout, LoadHistory, histories_of
+from palpate.dataset.histories import history_dataset
+from palpate.errors import UsageError
+from palpate.learning.learn_dataset import learn
+from palpate.learning.plastic import Press, learn_indentation
 from palpate.learning.plastic.learn_with_memory import HIGHEST, LIMITS, LOWEST, PER_DECADE
 from palpate.surrogates.memories import Indentation, IwanElements
+from palpate.sweeps.drives import random_times, random_turns
+from palpate.units import Range
 from remembering import press
 
 YIELDS = IwanElements.sliders(
@@ -48,10 +45,10 @@ def path(
     return LoadHistory(clock, w, force, q * q / 2, nothing, shape)
 
 
-def paths(*several: LoadHistory) -> LoadHistories:
-    return LoadHistories(
-        np.array([[0.0, 0], [1.0, 0]]), 1, np.array([0.0, -1.0]), several, nodes_of_interest=(1,)
-    )
+def paths(*several: LoadHistory, same: LoadHistory | None = None) -> Dataset:
+    layout = Layout(np.array([[0.0, 0], [1.0, 0]]), np.array([False, True]), [1], [[0.0, -1.0]])
+    origin = {"problem": {"body": {"type": "Cantilever"}}}
+    return history_dataset(several, Range("P", -60.0, 60.0, "N"), layout, origin, elastic=same)
 
 
 def elastic(elements: IwanElements) -> LoadHistory:
@@ -67,7 +64,7 @@ def test_sliders_are_found_to_the_grid_and_answer_unseen_histories() -> None:
     def walk(outward: float) -> LoadHistory:
         return path(YIELDS, random_turns(rng, -0.5, 0.5, turns=6, step=0.02, outward=outward))
 
-    body, fit = learn_with_memory(paths(walk(3.0), walk(3.0), walk(3.0)), elastic(YIELDS))
+    body, history = learn(paths(walk(3.0), walk(3.0), walk(3.0), same=elastic(YIELDS)))
     # a limit between two of the grid is at most half their distance from one of them
     half = 0.5 * ((HIGHEST / LOWEST) ** (1 / (LIMITS - 1)) - 1)
     slope = amplitude(np.array([0.5]), 115.0)[1][0]
@@ -78,8 +75,8 @@ def test_sliders_are_found_to_the_grid_and_answer_unseen_histories() -> None:
         assert led.stored.min() >= 0
         assert (np.diff(led.lost) >= 0).all()
     assert body.memory.total == pytest.approx(1.0, rel=0.01)
-    assert fit.elastic_error < 1e-3
-    assert "elements" in str(fit)
+    assert history.memory.elastic_error < 1e-3
+    assert "elements" in str(history)
 
 
 @pytest.mark.full
@@ -90,7 +87,7 @@ def test_dashpots_are_found_to_the_grid() -> None:
         times, w = random_times(rng, -0.5, 0.5, span=8.0, step=0.04)
         return path(CREEPS, w, times)
 
-    body, _ = learn_with_memory(paths(drive(), drive()), elastic(CREEPS), relaxes=True)
+    body, _ = learn(paths(drive(), drive(), same=elastic(CREEPS)), relaxes=True)
     unseen = drive()
     force = body.follow(unseen.place[:, None], unseen.times).force[:, 1]
     # two exponentials of the grid stand for one between them: to the square of half their distance
@@ -102,13 +99,12 @@ def test_dashpots_are_found_to_the_grid() -> None:
 
 def test_histories_come_back_from_their_file(tmp_path: Path) -> None:
     some = paths(path(YIELDS, np.array([0.1, 0.3])), path(YIELDS, np.array([0.2, -0.1, 0.0])))
-    found = LoadHistories.load(some.save(tmp_path / "some.palpate"))
-    assert str(found) == str(some)
-    for one, other in zip(some.paths, found.paths, strict=True):
+    found = Dataset.open(some.save(tmp_path / "some.zarr"))
+    assert found.hash == some.hash
+    assert found.size_in_words == "2 histories with 5 samples"
+    for one, other in zip(histories_of(some), histories_of(found), strict=True):
         np.testing.assert_array_equal(one.force, other.force)
         np.testing.assert_array_equal(one.displacement, other.displacement)
-    with pytest.raises(FileFormatError):
-        LoadHistories.load(tmp_path / "none.palpate")
 
 
 def test_histories_that_fit_nothing_are_refused() -> None:
@@ -116,9 +112,9 @@ def test_histories_that_fit_nothing_are_refused() -> None:
     with pytest.raises(UsageError, match="no history"):
         LoadHistory(good.times[::-1], good.place, good.force, good.stored, good.lost, good.displacement)
     with pytest.raises(UsageError, match="elastic body was led"):
-        learn_with_memory(paths(path(YIELDS, np.array([0.1, 0.9]))), elastic(YIELDS))
+        learn(paths(path(YIELDS, np.array([0.1, 0.9])), same=elastic(YIELDS)))
     with pytest.raises(UsageError, match="too few"):
-        learn_with_memory(paths(), elastic(YIELDS))
+        learn(paths(same=elastic(YIELDS)))
 
 
 def test_the_tables_of_a_dent_come_back() -> None:
@@ -138,3 +134,14 @@ def test_the_tables_of_a_dent_come_back() -> None:
     np.testing.assert_allclose(found.reach, made.reach, rtol=1e-4)
     np.testing.assert_allclose(found.residual, made.residual, atol=1e-4)
     np.testing.assert_allclose(found.stiffening, made.stiffening, rtol=1e-3)
+
+
+def test_a_split_keeps_histories_whole_and_the_elastic_one_to_learn_from() -> None:
+    rng = np.random.default_rng(4)
+    several = [path(YIELDS, random_turns(rng, -0.5, 0.5, step=0.02, outward=3.0)) for _ in range(4)]
+    train, test = paths(*several, same=elastic(YIELDS)).split(test=0.25, seed=1)
+    numbers = set(np.unique(train["history"])), set(np.unique(test["history"]))
+    assert numbers[0] | numbers[1] == {-1, 0, 1, 2, 3}
+    assert numbers[0] & numbers[1] == set()
+    assert -1 in numbers[0]
+    assert len(numbers[1]) == 1

@@ -90,6 +90,7 @@ def test_an_unknown_surface_is_refused_with_those_there_are(make):
         (lambda: GluedPad(at=PLACE), "needs one place"),
         (lambda: GluedPad(radius=0.01, at=PLACE, over=((0, 0), (1, 1))), "needs one place"),
         (lambda: GluedPad(radius=-0.01, at=PLACE), "must be positive"),
+        (lambda: GluedPad(radius=0.01, at=PLACE, pad="rigid"), "stress has no bound"),
         (lambda: GluedPad(pad=0.0), "must be positive"),
         (lambda: GluedPad(displacement=(0.0, 0.0, 0.001)), "fixed at"),
         (lambda: GluedPad(displacement=(0.0, (-1.0, 1.0))), "three components"),

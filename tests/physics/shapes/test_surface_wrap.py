@@ -86,3 +86,29 @@ def test_a_wrap_that_misses_a_part_is_refused():
     with pytest.raises(UsageError, match="misses a part") as refusal:
         wrap_surface(surface(points, triangles), 0.003)
     assert "piece of its own" in refusal.value.why
+
+
+@pytest.mark.full
+@pytest.mark.timeout(240)
+@pytest.mark.filterwarnings("ignore:.*was read with repairs")
+def test_a_wrapped_scan_is_pressed_like_the_body_that_was_scanned(tmp_path):
+    """A noisy ball that a small one cuts into, wrapped; where the small one is far, the clean ball gives way alike."""
+    rng, ball, lump = np.random.default_rng(1), icosphere(4), icosphere(3)
+    noisy = (0.025 + 1e-4 * rng.normal(size=(len(ball.vertices), 1))) * ball.vertices
+    points = np.concatenate([noisy, 0.006 * lump.vertices + [0.022, 0.0, -0.01]])
+    scan = write(tmp_path / "scan.stl", points, np.concatenate([ball.faces, lump.faces + len(noisy)]))
+    clean = write(tmp_path / "clean.stl", 0.025 * ball.vertices, ball.faces)
+    held = pp.shapes.SurfacePatch("held", facing=(0.0, 0.0, -1.0), within=35)
+    touched = pp.shapes.SurfacePatch("touched", facing=(0.0, 0.0, 1.0), within=35)
+    pressed = []
+    for path, wrap in ((scan, 0.003), (clean, None)):
+        shape = pp.shapes.ImportedSolid(path, "mm", element=0.02, wrap=wrap, patches=(held, touched))
+        probe = pp.SphereProbe(
+            0.012, touches="touched", depth=(0.0, 0.004), over=((-1e-3, -1e-3), (1e-3, 1e-3))
+        )
+        problem = pp.Body(shape, pp.materials.NeoHookean(9e3, 0.45), fixed="held").problem(probe)
+        axis = np.linalg.norm(problem.mesh.points[:, :2], axis=1) < 0.004
+        top = problem.mesh.points[axis, 2].max()
+        assert top == pytest.approx(0.025, abs=0.0005)
+        pressed.append(problem.solve((0.0, 0.0, top + 0.012 - 0.003)).response[2])
+    assert pressed[0] == pytest.approx(pressed[1], rel=0.05)

@@ -5,10 +5,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from skins import ball, box, directions, plate, tube
+from skins import ball, box, directions, plate, quads, tube
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.surrogates.surface import TouchedSurface, distance_into
+from palpate.surrogates.surface.distance_table import GAIN, SOME
 
 R = 0.010  # m
 FACE = 0.060  # m
@@ -428,3 +429,16 @@ def test_with_a_shoulder_the_distance_is_the_height_right_up_to_the_border():
         surface.at(line)[0][:18], (np.hypot(b, 0.002 + rho) - rho)[:18], atol=1e-3 * 0.01
     )
     assert (surface.depth(line[30:], 0.01) <= 0).all()
+
+
+def test_the_kinks_of_a_scan_take_no_finer_table():
+    """Between noisy triangles a finer table is no more exact, so the coarsest is kept."""
+    x = np.linspace(-0.012, 0.012, 17)
+    points = np.stack([*np.meshgrid(x, x, indexing="ij"), np.zeros((17, 17))], -1).reshape(-1, 3)
+    points[:, 2] = 5e-5 * np.random.default_rng(0).standard_normal(len(points))
+    triangles = quads(17 * np.arange(17)[:, None] + np.arange(17))
+    sizes = {"radius": 0.008, "inner": 0.004, "shoulder": 0.002}
+    kept = TouchedSurface.of(points, triangles, **sizes)
+    assert kept.spacing == pytest.approx(0.008 / SOME)
+    finer = TouchedSurface.of(points, triangles, **sizes, spacing=0.7 * kept.spacing)
+    assert finer.error > GAIN * kept.error

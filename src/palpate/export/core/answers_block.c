@@ -12,7 +12,7 @@ PP_PART int pp_answer_net_fits(const pp_array *net, int32_t n, int32_t outputs) 
   if (!pp_is(&net[PP_SIZES], 7, 1, 0) || sizes[0] != n || outputs < 1) return 0;
   if (sizes[1] < 0 || sizes[1] > PP_MOST * PP_MOST || sizes[2] < 0 || sizes[2] > PP_MOST || sizes[3] < 0) return 0;
   if (sizes[4] < 1 || sizes[4] > (1 << 16) || sizes[5] < 0 || sizes[5] > 2 || sizes[6] != 0) return 0;
-  if (!pp_is(&net[PP_SCALES], 2, n, 1) || !pp_dense(&net[PP_TAIL])) return 0;
+  if (!pp_is(&net[PP_SCALES], net[PP_SCALES].n[0] == 3 ? 3 : 2, n, 1) || !pp_dense(&net[PP_TAIL])) return 0;
   tail = (int64_t)(1 + n) * sizes[4];
   if (net[PP_TAIL].n[0] == tail ? outputs != sizes[4] : net[PP_TAIL].n[0] != tail + (int64_t)(1 + sizes[4]) * outputs) return 0;
   groups = (sizes[3] + PP_LANES - 1) / PP_LANES;

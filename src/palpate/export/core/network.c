@@ -186,11 +186,26 @@ PP_PART pp_real pp_second_order(const pp_array *net, const pp_real *xi, int32_t 
   return total + pp_sum(value);
 }
 
+/* Scaled inputs xi = (x - c) / (h + b (x - c)); without bends b, and far outside of the range, the denominator is fixed. */
 PP_PART void pp_scale(const pp_array *net, const pp_real *x, pp_real *xi) {
   const int32_t n = net[PP_SIZES].whole[0];
   const pp_real *scales = net[PP_SCALES].real;
   int32_t i;
-  for (i = 0; i < n; i++) xi[i] = (x[i] - scales[i]) / scales[n + i];
+  for (i = 0; i < n; i++) {
+    const pp_real far = x[i] - scales[i], h = scales[n + i];
+    const pp_real b = net[PP_SCALES].n[0] == 3 ? scales[2 * n + i] : R(0);
+    xi[i] = far / (b == R(0) ? h : pp_most(h + b * far, h / (R(2) * (R(1) + PP_ABS(b)))));
+  }
+}
+
+/* Derivative of a scaled input by the unscaled one, the scaled one being known: d = h / (1 - b xi), and h / d^2. */
+PP_PART pp_real pp_scale_slope(const pp_array *net, int32_t i, pp_real xi) {
+  const int32_t n = net[PP_SIZES].whole[0];
+  const pp_real h = net[PP_SCALES].real[n + i];
+  const pp_real b = net[PP_SCALES].n[0] == 3 ? net[PP_SCALES].real[2 * n + i] : R(0);
+  const pp_real turn = R(1) - b * xi, end = R(2) * (R(1) + PP_ABS(b));
+  if (b == R(0)) return R(1) / h;
+  return turn > end ? end / h : turn * turn / h;
 }
 
 /* Latent outputs (k) at scaled inputs; with `slopes` also their derivatives (n, k) by the unscaled inputs. */
@@ -198,9 +213,9 @@ PP_PART void pp_latent(const pp_array *net, const pp_real *xi, pp_real *y, pp_re
   const int32_t *sizes = net[PP_SIZES].whole;
   const int32_t n = sizes[0], e = sizes[1], r = sizes[2], outputs = sizes[4], pairs = sizes[6];
   const int32_t record = (e + r + pairs + outputs) * PP_LANES, groups = net[PP_UNITS].n[0];
-  const pp_real *tail = net[PP_TAIL].real, *scales = net[PP_SCALES].real + n;
+  const pp_real *tail = net[PP_TAIL].real;
   pp_real v[PP_MOST][PP_LANES], u[PP_MOST][PP_LANES], distance[PP_LANES], phi[PP_LANES], d1[PP_LANES], d2[PP_LANES];
-  pp_real part[PP_LANES];
+  pp_real part[PP_LANES], step[PP_MOST];
   int32_t k, i, o;
   int l;
   for (o = 0; o < outputs; o++) {
@@ -208,7 +223,8 @@ PP_PART void pp_latent(const pp_array *net, const pp_real *xi, pp_real *y, pp_re
     for (i = 0; i < n; i++) y[o] += tail[(1 + i) * outputs + o] * xi[i];
   }
   for (i = 0; slopes && i < n; i++) {
-    for (o = 0; o < outputs; o++) slopes[i * outputs + o] = tail[(1 + i) * outputs + o] / scales[i];
+    step[i] = pp_scale_slope(net, i, xi[i]);
+    for (o = 0; o < outputs; o++) slopes[i * outputs + o] = tail[(1 + i) * outputs + o] * step[i];
   }
   for (k = 0; k < groups; k++) {
     const pp_real *unit = net[PP_UNITS].real + (size_t)k * (size_t)record;
@@ -224,7 +240,7 @@ PP_PART void pp_latent(const pp_array *net, const pp_real *xi, pp_real *y, pp_re
     for (i = 0; i < n; i++) {
       for (o = 0; o < outputs; o++) {
         for (l = 0; l < PP_LANES; l++) part[l] = R(2) * weights[o * PP_LANES + l] * d1[l] * u[i][l];
-        slopes[i * outputs + o] += pp_sum(part) / scales[i];
+        slopes[i * outputs + o] += pp_sum(part) * step[i];
       }
     }
   }

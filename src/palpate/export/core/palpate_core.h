@@ -54,7 +54,7 @@ enum {
 /* a network's arrays, counted from its first place */
 enum {
   PP_SIZES = 0,  /* n inputs, e entries of a factor, r rows of it, h units, latent outputs, radial function, pairs */
-  PP_SCALES = 1, /* (2, n): centre and half width of each input */
+  PP_SCALES = 1, /* (2, n): centre and half width of each input; of answers a third row may hold their bends */
   PP_LAYOUT = 2, /* (e, 2): row and column of each entry */
   PP_UNITS = 3,  /* (groups, e + r + pairs + latent, PP_LANES): entries, shifts, entries of A'A, weights */
   PP_TAIL = 4,   /* (1 + n, latent): constant and slopes; then (1 + latent, m) offset and modes of many outputs */

@@ -40,6 +40,7 @@ class Samples:
     # of each row in the table, by which notes name a sample; None where they count rows from 0
     lines: tuple[int, ...] | None = None
     rows: tuple[int, ...] | None = None  # of the table, one for each sample, where some rows are left out
+    bends: np.ndarray | None = None  # (n,), of the inputs' scales; None where all are straight
 
     @classmethod
     def of(
@@ -84,13 +85,18 @@ class ArrayProblem:
 
     @classmethod
     def of(
-        cls, X: np.ndarray, Y: np.ndarray, inputs: Sequence[Range], outputs: Sequence[Quantity]
+        cls,
+        X: np.ndarray,
+        Y: np.ndarray,
+        inputs: Sequence[Range],
+        outputs: Sequence[Quantity],
+        bends: np.ndarray | None = None,
     ) -> ArrayProblem:
         """Scale X (N, n) and Y (N, m), which are in SI units; 20 samples at least."""
         X, Y, _, _, _ = samples(X, Y, inputs=len(inputs), outputs=len(outputs), fewest=FEWEST)
         spread = spread_of(Y)
         constant = not np.ptp(Y, axis=0).any() or spread <= 1e-13 * float(np.abs(Y).max())
-        scaling = Scaling.of(inputs, Y, scale=1.0 if constant else _scales(Y, outputs))
+        scaling = Scaling.of(inputs, Y, scale=1.0 if constant else _scales(Y, outputs), bends=bends)
         latent, basis = leading_modes(
             np.zeros_like(Y) if constant else scaling.scale_outputs(Y), most=_MODES_MAX
         )

@@ -77,7 +77,7 @@ def better_with_copies(fitted: Fitted, samples: Samples, some: Samples, options:
 
 
 def _problem_of(samples: Samples) -> ArrayProblem:
-    return ArrayProblem.of(samples.X, samples.Y, samples.inputs, samples.outputs)
+    return ArrayProblem.of(samples.X, samples.Y, samples.inputs, samples.outputs, samples.bends)
 
 
 def _centres_of_copies(X: np.ndarray, places: np.ndarray) -> np.ndarray:

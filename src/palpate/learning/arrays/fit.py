@@ -77,6 +77,7 @@ def fit(
     outputs: Sequence[Quantity] | None = None,
     *,
     lines: Sequence[int] | None = None,
+    bends: np.ndarray | None = None,
     options: FitOptions,
 ) -> Fitted:
     """Choose and fit a network from samples alone.
@@ -96,6 +97,8 @@ def fit(
     lines : sequence of N int, optional
         Line of each sample in the file that it comes from; notes name a sample by it. By default they name its row
         in X, counted from 0.
+    bends : (n,), optional
+        Bends of the inputs' scales, see `palpate.network.Scaling`; all are straight by default.
 
     Returns
     -------
@@ -123,7 +126,7 @@ def fit(
 
     began = time.monotonic()
     budget, seconds = Budget.of(options.effort, options.seconds), options.seconds
-    samples = Samples.of(X, Y, inputs, outputs, lines)
+    samples = replace(Samples.of(X, Y, inputs, outputs, lines), bends=bends)
     if seconds is not None:  # fitting to all samples and freezing come after the search
         planned = seconds / _PLANNED_SECONDS
         asked = 1.0 if budget.effort == FitOptions().effort else budget.effort
@@ -364,7 +367,7 @@ class _Chooser:
         few = self.split.first(LOOK_SAMPLES)
         names = forms_for(self.X.shape[1])
         looks = self._run([self._enter(name, _LOOK_NUMBERS) for name in names], 20, few)
-        best = _best_of(looks)
+        best = min(looks, key=_error)
         # a form that leads by far, and leads the kernel layer too, has won; else the larger size tells
         far = 2.0 if best.error < mark else 3.0
         kept = sorted((one for one in looks if one.error <= far * best.error), key=_error)
@@ -377,7 +380,7 @@ class _Chooser:
         if not grown or grown[0].network is None:
             best = self._ahead(looks)
             return best, best
-        least = _best_of(grown).error
+        least = min(grown, key=_error).error
         near = [one for one in grown if one.error <= _BEHIND * least]
         pairs = [*zip(self._run(near, 15, few), near, strict=True), (best, best)]
         return min(pairs, key=lambda pair: pair[0].error)
@@ -387,7 +390,7 @@ class _Chooser:
 
     def _ahead(self, looks: list[Candidate]) -> Candidate:
         """Return of small networks, soon refined, the one whose form does best on two further folds too."""
-        best = _best_of(looks)
+        best = min(looks, key=_error)
         close = [one for one in looks if one.error <= 1.5 * best.error]
         if self.quick or len(close) == 1 or best.error <= self.target:
             return best
@@ -409,22 +412,22 @@ class _Chooser:
             return winner
         others = [carry(before, name) for name in RADIAL_FUNCTIONS if name != winner.regressors.radial]
         all_three = [winner, *self._run(others, 15, self.split.first(LOOK_SAMPLES))]
-        least = _best_of(all_three).error
+        least = min(all_three, key=_error).error
         kept = [one for one in all_three if one.error <= 1.6 * least]
-        return kept[0] if len(kept) == 1 else _best_of(self._run(kept, 15, self.split))
+        return kept[0] if len(kept) == 1 else min(self._run(kept, 15, self.split), key=_error)
 
     def _sizes(self, winner: Candidate) -> Candidate:
         """Return fewer units where samples set their number: the largest network may know too much by heart."""
         tried = [winner]
         for factor in (0.6, 0.35, 0.2):
-            if tried[-1].error <= self.target or (len(tried) > 1 and _best_of(tried) is not tried[-1]):
+            if tried[-1].error <= self.target or (len(tried) > 1 and min(tried, key=_error) is not tried[-1]):
                 break
             form, numbers = winner.kind[0], round(factor * winner.theta.size)
             fresh = self.split.enter(form, numbers, self.scales, self.seed)
             fresh = self._run([fresh], 10, self.split, record=False)[0]
             fresh = carry(fresh, winner.regressors.radial)
             tried += self._run([fresh], max(30, winner.iterations), self.split)
-        return _best_of(tried)
+        return min(tried, key=_error)
 
     def _finalist(self, winner: Candidate) -> Crossed | None:
         """Return the networks of the best kind, learnt crosswise: the winner's, or a rival's if work allows."""
@@ -494,7 +497,3 @@ class _Chooser:
         assert one.network is not None
         network = refit_weights(one.network, self.X, self.Y, RIDGE)
         return self._last_stage.network(network, self.split, one.error, before=one.network, form=form)
-
-
-def _best_of(candidates: Sequence[Candidate]) -> Candidate:
-    return min(candidates, key=_error)

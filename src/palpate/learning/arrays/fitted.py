@@ -231,7 +231,8 @@ class Fitted:
         file : path, optional
             Its file, whose hash goes into the card.
         """
-        return card_of(self._with_record(), file)
+        name = "model" if file is None else Path(file).stem
+        return card_of(Surrogate.of(self._with_record(), name), file)
 
     def to_html(self) -> str:
         """Return the model card as one HTML page."""

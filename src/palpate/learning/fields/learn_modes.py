@@ -20,6 +20,7 @@ from threadpoolctl import threadpool_limits
 from palpate.errors import FitWarning, UsageError
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
+from palpate.learning.arrays.input_bends import choose_bends
 from palpate.learning.fields.decompose_field import SurfaceModes
 from palpate.learning.folds import fold_masks
 from palpate.options import FitOptions
@@ -84,6 +85,7 @@ def learn_modes(
     unit: str = "",
     components: Sequence[str] = (),
     modes_max: int = _MODES,
+    bends: np.ndarray | None = None,
     options: FitOptions | None = None,
 ) -> LearntModes:
     """Learn a field at places from solves.
@@ -104,6 +106,8 @@ def learn_modes(
         Names of the components; none of a scalar.
     modes_max : int
         Most modes.
+    bends : (n,), optional
+        Bends of the inputs' scales; by default `choose_bends` chooses them for this field.
     options : FitOptions, optional
         Of the search for the network of the coefficients.
 
@@ -135,11 +139,12 @@ def learn_modes(
         modes, missed = every.modes[:k], every.missed
         along = (offsets * shares[:, None]).reshape(len(X), -1) @ modes.reshape(k, -1).T
         left = _left_out_remainders(offsets, k)
+        bends = choose_bends(X, [along], inputs) if bends is None else bends
     quantities = [Quantity(f"coefficient {i + 1}", unit) for i in range(k)]
     with warnings.catch_warnings():
         # that small coefficients are as good as not learnt is what they are made for
         warnings.simplefilter("ignore", FitWarning)
-        fitted = fit(X, along, list(inputs), quantities, options=options or FitOptions())
+        fitted = fit(X, along, list(inputs), quantities, bends=bends, options=options or FitOptions())
     scatter = np.sqrt((left**2).mean(axis=0))
     errors, spread = _errors(fitted, along, modes, left)
     weights = _weights(fitted, inputs)
@@ -155,7 +160,7 @@ def learn_modes(
     }
     coefficients = next(iter(fitted.surrogate().quantities.values()))
     parts = (coefficients, mean, modes, scatter, widening, tuple(components), meta)
-    field = ModalField(name, unit, places, *parts)
+    field = ModalField(name, unit, places, *parts, solved_at=X, solved=along)
     return LearntModes(field, fitted, sizes)
 
 

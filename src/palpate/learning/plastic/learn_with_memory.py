@@ -12,30 +12,24 @@ sparse. No start, no iteration count and no seed decide it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from palpate.dataset import Dataset, LoadHistory, histories_of, is_history
+from palpate.dataset.histories import ELASTIC, elastic_of
 from palpate.errors import UsageError
 from palpate.format import share
-from palpate.learning.energy import EnergyHistory, learn_energy
-from palpate.learning.plastic.load_histories import LoadHistories, LoadHistory
+from palpate.learning.recognised import Recognised, Request, recogniser
 from palpate.learning.structure import refined_network
-from palpate.surrogates import (
-    LearntEnergy,
-    NodeField,
-    PadBaseline,
-    RestStiffness,
-    Solves,
-    Stiffening,
-    Surrogate,
-)
-from palpate.surrogates.memories import IwanElements
+from palpate.surrogates import LearntEnergy, NodeField, PadBaseline, RestStiffness, Solves, Stiffening
+from palpate.surrogates.memories import IwanElements, Memory
 from palpate.units import Quantity, Range
 
-__all__ = ["MemoryFit", "learn_with_memory"]
+__all__ = ["MemoryFit", "recognise_histories"]
 
 LIMITS = 32  # of the grid, geometric: neighbours differ by a tenth
 LOWEST, HIGHEST = 0.04, 1.0  # its ends over the largest amplitude
@@ -46,7 +40,11 @@ NEGLIGIBLE = 1e-5  # of the stiffness: less can't be felt
 SHAPES = 240  # samples that the displacement is learnt from
 FEWEST = 8  # samples of the elastic body
 _STILL = 1e-3  # of its largest place: nearer to rest round-off decides
-_UNITS, _EFFORT = 6, 0.3  # of its energy
+_EFFORT = 0.3  # of its energy
+# what is solved bears no noise, and the baseline has no rivals
+_EXACT = {"choose": False, "units_max": 6, "networks": 1, "target": 1e-7, "ridge": 1e-13, "tolerance": 1e-9}
+
+Paths: TypeAlias = Sequence[LoadHistory]
 
 
 @dataclass(frozen=True)
@@ -80,76 +78,63 @@ class MemoryFit:
         )
 
 
-def learn_with_memory(
-    train: LoadHistories,
-    elastic: LoadHistory,
-    *,
-    relaxes: bool = False,
-    mirrors: bool = True,
-    name: str = "held body",
-    effort: float = 1.0,
-    workers: int | None = None,
-    seed: int = 0,
-) -> tuple[Surrogate, MemoryFit]:
-    """Learn a held body that yields or creeps.
+@recogniser
+def recognise_histories(data: Dataset, request: Request) -> Recognised | None:
+    """Return the body of load histories, which yields or creeps; None of any other dataset.
 
-    Parameters
-    ----------
-    train : LoadHistories
-        With turning points; a body that yields shows its hardening only when it is turned back.
-    elastic : LoadHistory
-        Of the same body without a memory: its instantaneous answer, as far as the histories reach.
-    relaxes : bool
-        Whether it creeps with time; else it yields.
-    mirrors : bool
-        Whether both sides answer alike.
-    name : str
-        The body's name.
-    effort : float
-        Multiplies the counts of candidates and iterations of the search for the energy.
-    workers : int, optional
-        Processes that search at a time; the result is the same with any number.
-    seed : int
-        Decides the starts of the networks' refinement.
-
-    Returns
-    -------
-    Surrogate
-        With an energy along the load, a field at its nodes, and springs that slip or relax as its memory.
-    MemoryFit
-        How well it fits the histories.
-
-    Raises
-    ------
-    UsageError
-        If there are no histories, the elastic one doesn't reach as far, or no stiffness explains the forces.
+    The options ``mirrors`` (whether both sides answer alike, True by default) and ``relaxes`` (whether it creeps, by
+    default as the dataset says) are its own.
     """
-    _check(train, elastic, mirrors)
-    searches = {"effort": _EFFORT * effort, "workers": workers, "seed": seed}
-    energy, found = _energy(train, elastic, mirrors, searches)
+    if not is_history(data):
+        return None
+    own, further = request.split("mirrors", "relaxes")
+    relaxes = bool(own.get("relaxes", data.provenance.get("relaxes", False)))
+    mirrors, paths = bool(own.get("mirrors", True)), histories_of(data)
+    elastic = _checked(paths, elastic_of(data), mirrors)
+    baseline, solves, kept = _energy(data, paths, elastic, mirrors)
     with threadpool_limits(1):
-        shape, shape_error = _shape(train, mirrors, seed)
-        amplitudes = [_amplitudes(energy, history.place) for history in train.paths]
+        shape, shape_error = _shape(data, paths, mirrors, request.search.seed)
+
+    def memory(energy: LearntEnergy) -> tuple[Memory, MemoryFit]:
+        return _memory(energy, paths, elastic, shape_error, relaxes=relaxes)
+
+    return Recognised(
+        baseline,
+        solves,
+        {**_EXACT, "effort": _EFFORT * request.search.effort, **further},
+        fields={"displacement": shape},
+        meta={"histories": len(paths), "samples": sum(map(len, paths)), "relaxes": relaxes},
+        rows=np.flatnonzero(data["history"] == ELASTIC)[kept],
+        memory=memory,
+    )
+
+
+def _memory(
+    energy: LearntEnergy, paths: Paths, elastic: LoadHistory, shape_error: float, *, relaxes: bool
+) -> tuple[Memory, MemoryFit]:
+    """Return the elements that explain the forces along the histories, beside the energy without a memory."""
+    with threadpool_limits(1):
+        amplitudes = [_amplitudes(energy, history.place) for history in paths]
         reach = max(float(np.abs(q).max()) for q, _ in amplitudes)
-        candidates = _times(train) if relaxes else _limits(reach)
-        elements, error = _fitted(train, amplitudes, candidates, relaxes)
+        candidates = _times(paths) if relaxes else _limits(reach)
+        elements, error = _fitted(paths, amplitudes, candidates, relaxes)
     near = np.abs(elastic.place) <= energy.inputs[0].high
     answer = -energy.force(elastic.place[near][:, None]) @ energy.baseline.directions[0]
     miss = float(np.abs(answer - elastic.force[near]).max() / np.abs(elastic.force[near]).max())
-    samples = sum(map(len, train.paths))
-    fit = MemoryFit(error, len(elements), len(candidates), miss, shape_error)
-    meta = {**found.meta, "name": name, "histories": len(train), "samples": samples, "relaxes": relaxes}
-    meta = {k: v for k, v in meta.items() if k != "solves"}
-    return Surrogate(energy, {"displacement": shape}, elements, meta), fit
+    return elements, MemoryFit(error, len(elements), len(candidates), miss, shape_error)
 
 
-def _check(train: LoadHistories, elastic: LoadHistory, mirrors: bool) -> None:
-    if not train.paths or len(elastic) < FEWEST:
+def _checked(paths: Paths, elastic: LoadHistory | None, mirrors: bool) -> LoadHistory:
+    """Return the history of the elastic body; an error where it does not reach as far as the others."""
+    if not paths or elastic is None or len(elastic) < FEWEST:
+        known = 0 if elastic is None else len(elastic)
         raise UsageError(
-            f"{len(train)} histories and an elastic one of {len(elastic)} samples are too few to learn from.",
-            fix=f"Give one history at least, better ten, and {FEWEST} samples of the elastic body.",
+            f"{len(paths)} histories and an elastic one of {known} samples are too few to learn from.",
+            why="The energy of the body without its memory is learnt first.",
+            fix=f"Give one history at least, better ten, and {FEWEST} samples of the elastic body: "
+            "solve_histories(problem, elastic=…).",
         )
-    places = np.concatenate([path.place for path in train.paths])
+    places = np.concatenate([path.place for path in paths])
     low, high = float(places.min()), float(places.max())
     a, b = float(min(elastic.place.min(), 0.0)), float(max(elastic.place.max(), 0.0))
     if mirrors:
@@ -160,19 +145,19 @@ def _check(train: LoadHistories, elastic: LoadHistory, mirrors: bool) -> None:
             why="Its energy has to be known wherever they go.",
             fix="Load the elastic body more.",
         )
+    return elastic
 
 
 def _energy(
-    train: LoadHistories, elastic: LoadHistory, mirrors: bool, searches: dict[str, Any]
-) -> tuple[LearntEnergy, EnergyHistory]:
-    """Return the energy of the body without its memory, along the load."""
-    D = np.append(train.direction, 0.0)
+    data: Dataset, paths: Paths, elastic: LoadHistory, mirrors: bool
+) -> tuple[PadBaseline, Solves, np.ndarray]:
+    """Return baseline and solves of the body without its memory, along the load, and which samples these are."""
+    D = np.append(data.load_directions[0], 0.0)
     far = np.abs(elastic.place)
-    reach = max(float(np.abs(path.place).max()) for path in train.paths)
+    reach = max(float(np.abs(path.place).max()) for path in paths)
     last = float(far[far >= reach].min(initial=far.max()))  # what lies beyond the histories is not trained
-    w, P, U = (
-        a[(far > _STILL * far.max()) & (far <= last)] for a in (elastic.place, elastic.force, elastic.stored)
-    )
+    kept = (far > _STILL * far.max()) & (far <= last)
+    w, P, U = (a[kept] for a in (elastic.place, elastic.force, elastic.stored))
     least = int(np.argmin(np.abs(w)))
     K = np.array([[P[least] / w[least]]])
     baseline = PadBaseline(RestStiffness.even(K), Stiffening.none(1), axes=D[None])
@@ -182,12 +167,7 @@ def _energy(
         high = max(-low, high)
         low, symmetry = -high, np.stack([np.eye(3), np.eye(3) - 2.0 * np.outer(D, D)])
     solves = Solves(w[:, None], U, -P[:, None], None, (Range("w", low, high, "m"),), symmetry=symmetry)
-    exact: dict[str, Any] = {
-        "target": 1e-7,
-        "ridge": 1e-13,
-        "tolerance": 1e-9,
-    }  # what is solved bears no noise
-    return learn_energy(solves, baseline, choose=False, units_max=_UNITS, networks=1, **exact, **searches)
+    return baseline, solves, kept
 
 
 def _amplitudes(energy: LearntEnergy, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -200,12 +180,12 @@ def _amplitudes(energy: LearntEnergy, places: np.ndarray) -> tuple[np.ndarray, n
     return out[0], out[1]
 
 
-def _shape(train: LoadHistories, mirrors: bool, seed: int) -> tuple[NodeField, float]:
+def _shape(data: Dataset, paths: Paths, mirrors: bool, seed: int) -> tuple[NodeField, float]:
     """Return the displacement of all nodes over (w, P); histories that kept to one side tell of the other too."""
-    X = np.concatenate([np.stack([path.place, path.force], axis=1) for path in train.paths])
-    moved = np.concatenate([path.displacement for path in train.paths])
-    along = np.asarray(train.direction, dtype=float)
-    if mirrors and np.allclose(train.rest @ along, train.rest[0] @ along):  # a straight body across the load
+    X = np.concatenate([np.stack([path.place, path.force], axis=1) for path in paths])
+    moved = np.concatenate([path.displacement for path in paths])
+    along, rest = np.asarray(data.load_directions[0], dtype=float), data.rest
+    if mirrors and np.allclose(rest @ along, rest[0] @ along):  # a straight body across the load
         mirrored = moved - 2 * (moved @ along)[..., None] * along
         X, moved = np.concatenate([X, -X]), np.concatenate([moved, mirrored])
     Y = moved.reshape(len(moved), -1)
@@ -215,22 +195,23 @@ def _shape(train: LoadHistories, mirrors: bool, seed: int) -> tuple[NodeField, f
         Range(name, float(column.min()), float(column.max()), unit)
         for (name, unit), column in zip(names, X.T, strict=True)
     ]
-    outputs = [Quantity(f"u_{c} at node {i}", "m") for i in range(len(train.rest)) for c in "xy"]
+    outputs = [Quantity(f"u_{c} at node {i}", "m") for i in range(len(rest)) for c in "xy"]
     network, refined, _ = refined_network(
         X[rows], Y[rows], ranges, outputs, target=2e-3, units_max=8, starts=2, seed=seed
     )
-    columns = np.array([(node, component) for node in range(len(train.rest)) for component in range(2)])
+    columns = np.array([(node, component) for node in range(len(rest)) for component in range(2)])
+    body = data.provenance.get("problem", {}).get("body", {})
     field = NodeField(
         "displacement",
         "m",
         network,
         columns,
-        np.pad(train.rest, ((0, 0), (0, 1))),
-        train.node,
+        np.pad(rest, ((0, 0), (0, 1))),
+        int(data.load_nodes[0]),
         np.ones(1, np.int64),
         "place and load",
-        radius=train.radius,
-        of_interest=np.array(train.nodes_of_interest, dtype=np.int64),
+        radius=float(body.get("half_height", 0.005)),
+        of_interest=data.nodes_of_interest,
     )
     return field, float(refined.loo)
 
@@ -242,19 +223,19 @@ def _limits(reach: float) -> np.ndarray:
     return np.array([(np.inf, 0.0, np.inf), *grid])
 
 
-def _times(train: LoadHistories) -> np.ndarray:
+def _times(paths: Paths) -> np.ndarray:
     """Return (y, c, τ) of each candidate (n, 3): a spring, and times from a third of a step to thrice the longest."""
-    steps = np.concatenate([np.diff(path.times, prepend=0.0) for path in train.paths])
+    steps = np.concatenate([np.diff(path.times, prepend=0.0) for path in paths])
     low, high = (
         np.log10(steps[steps > 0].min() / 3),
-        np.log10(3 * max(path.times[-1] for path in train.paths)),
+        np.log10(3 * max(path.times[-1] for path in paths)),
     )
     times = np.logspace(low, high, 2 + int(PER_DECADE * (high - low)))
     return np.array([(np.inf, 0.0, np.inf), *((np.inf, 0.0, t) for t in times)])
 
 
 def _fitted(
-    train: LoadHistories,
+    paths: Paths,
     amplitudes: list[tuple[np.ndarray, np.ndarray]],
     candidates: np.ndarray,
     relaxes: bool,
@@ -265,9 +246,9 @@ def _fitted(
     all_of_them = IwanElements(np.ones(len(limit)), limit, hardening, time)
     columns = [
         slope[:, None] * all_of_them.elongations(q, path.times if relaxes else None)
-        for (q, slope), path in zip(amplitudes, train.paths, strict=True)
+        for (q, slope), path in zip(amplitudes, paths, strict=True)
     ]
-    A, P = np.concatenate(columns), np.concatenate([path.force for path in train.paths])
+    A, P = np.concatenate(columns), np.concatenate([path.force for path in paths])
     largest = float(np.abs(P).max())
     k, rest = nnls(A, P)
     used = k > NEGLIGIBLE * k.sum()

@@ -22,6 +22,7 @@ from palpate.physics.interactions.bump import (
 )
 from palpate.physics.interactions.interaction import Attached, Energy, PlainInteraction
 from palpate.physics.interactions.interaction_checks import AXES, Interval, interval, tag
+from palpate.physics.interactions.sphere import RIGID
 from palpate.physics.shapes.naming import require_known
 from palpate.units import Range
 
@@ -29,9 +30,14 @@ if TYPE_CHECKING:
     from palpate.physics.shapes.mesh import BodyMesh
     from palpate.physics.shapes.meshing import FineMesh
 
-__all__ = ["GluedPad"]
+__all__ = ["NO_RIGID_GRIP", "GluedPad"]
 
 Corner = tuple[float, float]
+NO_RIGID_GRIP = (
+    "A rigid one would hold all of its disc, beyond whose rim the stress has no bound, so that its force would follow "
+    "the elements; and with a place that varies they would come into its hold by jumps."
+)
+"""The reason why a glued pad is never rigid, where a ball may be."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +59,8 @@ class GluedPad(PlainInteraction):
         ((low, low), (high, high)) in m: p becomes an input in this rectangle of the two coordinates that tell the
         surface's points, x and y on top. Instead of `at`.
     pad : float
-        Stiffness k in N/m³.
+        Stiffness k in N/m³. A number, never "rigid" as a ball's: a rigid disc that is glued has a stress without
+        bound at its rim.
     displacement : three of range or zero
         Along x, y and z, in m: a range is an input, a component of 0 stays there.
     facing : str, optional
@@ -80,6 +87,13 @@ class GluedPad(PlainInteraction):
     name: str = ""
 
     def __post_init__(self) -> None:
+        if self.pad == RIGID:
+            raise UsageError(
+                "A glued pad is asked to be rigid.",
+                why=NO_RIGID_GRIP,
+                fix="Give a stiffness in N/m³, or prescribe the displacement of a part of the surface: "
+                "PrescribedDisplacement(…, within=…).",
+            )
         checks.positive("The stiffness of a glued pad", self.pad, "N/m³")
         for what, size in (("radius of a glued pad", self.radius), ("element under a pad", self.element)):
             if size is not None:

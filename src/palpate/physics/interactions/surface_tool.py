@@ -120,7 +120,7 @@ class SurfaceTool(PressingTool):
 
     def offset(self, normals: np.ndarray) -> np.ndarray:
         """Return how high (N,) in m the place is above a plane of unit normals (N, 3) that the tool just touches."""
-        return self.posed.reach(normals) - normals @ self.to_centre
+        return np.asarray(self.posed.reach(normals) - normals @ self.to_centre)
 
     def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
         """Return the ranges of tip_x, tip_y and tip_z in m: the box around all its places."""

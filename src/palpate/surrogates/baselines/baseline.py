@@ -27,6 +27,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.format import millimetres
 from palpate.network.kinds import register_kind
+from palpate.surrogates.baselines.graph_form import BaselineForm, Graph, Touch, Value
 from palpate.surrogates.energy_kernels import GRADIENT, HESSIAN, SMALL, VECTORS, Compiled
 from palpate.surrogates.memories import Amplitude
 from palpate.surrogates.surface import TouchedSurface
@@ -219,6 +220,25 @@ class Baseline(ABC):
 
         The text defines four functions, called as the name with ``_enter``, ``_rest``, ``_log`` and ``_leave``; the
         arrays of `compiled` are theirs in the same order (docs/guide/export.md, "A baseline of your own").
+        """
+        return None
+
+    def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
+        """Return U₀ and its derivatives by the place (N, 3), for exporters of graphs such as ONNX.
+
+        `touch` is the probe at the baseline's surface where there is one, `xi` are the scaled inputs (N, n). By default
+        there is none, and those exporters refuse the baseline by name.
+        """
+        raise UsageError(
+            f"The baseline {self.name!r} has no ONNX form.",
+            why="Its formula is Python code that is compiled for this machine.",
+            fix="Export a body under a probe, a pad or beam loads.",
+        )
+
+    def graph_exponent(self, graph: Graph, xi: Value, half: np.ndarray) -> tuple[Value, Value, Value] | None:
+        """Return what ℓ has beside the network at scaled inputs (N, n), with first and second slopes; None by default.
+
+        The slopes (N, k) and (N, k, k) are by the k felt inputs, whose ranges have half the widths `half`.
         """
         return None
 

@@ -22,6 +22,7 @@ from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.kernels import part
 from palpate.surrogates.baselines.baseline import Baseline, register_baseline
+from palpate.surrogates.baselines.graph_form import BaselineForm, Graph, Touch, Value, outer
 from palpate.surrogates.energy_kernels import GRADIENT, HESSIAN, ROOT, VECTORS, Compiled
 from palpate.surrogates.memories import Amplitude
 from palpate.units import Range
@@ -89,6 +90,12 @@ class ConstantBaseline(Baseline):
     def compiled(self) -> Compiled:
         """Return the kernels and their arguments."""
         return Compiled(None, (self.level,), enter=_enter)
+
+    def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
+        """Return the constant, for exporters of graphs."""
+        zero = place * 0.0
+        level = place.columns(0, 1) * 0.0 + self.level
+        return BaselineForm(level, zero, outer(zero, zero), level * 0.0, zero)
 
     def c_source(self) -> str:
         """Return the kernels in C99."""

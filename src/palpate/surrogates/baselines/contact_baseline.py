@@ -14,12 +14,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from palpate.kernels import part
 from palpate.surrogates.baselines.baseline import Baseline, register_baseline
+from palpate.surrogates.baselines.graph_form import BaselineForm, Graph, Touch, Value, outer
 from palpate.surrogates.contact_law import ContactLaw, law_at
 from palpate.surrogates.continuation import saturated
 from palpate.surrogates.energy_kernels import (
@@ -134,6 +135,27 @@ class ContactBaseline(Baseline):
         usual = self.probe_radius if math.isfinite(self.probe_radius) else self.touched.reach
         numbers = np.array([*self.law.numbers(), self.probe_radius, own, _STEP * usual])
         return Compiled(None, (numbers, self.touched.compiled()), enter=_enter, leave=leave_contact)
+
+    def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
+        """Return the contact law at the depth s; see `palpate.surrogates.contact_law`."""
+        assert touch is not None  # it has a surface
+        return self._law_form(graph, graph.where(touch.contact, touch.depth, 1.0), touch.normal, touch.bend)
+
+    def _law_form(self, graph: Graph, s: Value, normal: Value, bend: Value) -> BaselineForm:
+        """Return the contact law at a depth s of slope −`normal` and Hessian −`bend`."""
+        twice, factor, length = self.law.numbers()
+        p = 0.5 * twice
+        g: Any = factor
+        g = graph.sqrt(s) * g if twice == 5.0 else s * g if twice == 6.0 else s * 0.0 + g
+        ratio: Any = 0.0
+        if math.isfinite(length):
+            ratio = s / (length + s)
+            g = g / graph.sqrt(1.0 + s / length)
+        value, slope = g * s * s, g * s * (p - 0.5 * ratio)
+        second = g * (p * (p - 1.0) - p * ratio + 0.75 * ratio * ratio)
+        hessian = second.spread(2) * outer(normal, normal) - slope.spread(2) * bend
+        gradient, root = -slope * normal, graph.sqrt(2.0 * value)
+        return BaselineForm(value, gradient, hessian, root, gradient / root)
 
     def c_source(self) -> str:
         """Return the kernels in C99."""

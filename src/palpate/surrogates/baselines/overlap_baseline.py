@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import ClassVar
 
@@ -22,6 +23,7 @@ from palpate.errors import UsageError
 from palpate.kernels import part
 from palpate.surrogates.baselines.baseline import register_baseline
 from palpate.surrogates.baselines.contact_baseline import ContactBaseline, leave_contact
+from palpate.surrogates.baselines.graph_form import BaselineForm, Graph, Touch, Value
 from palpate.surrogates.contact_law import law_at
 from palpate.surrogates.continuation import saturated
 from palpate.surrogates.energy_kernels import (
@@ -61,20 +63,21 @@ class OverlapBaseline(ContactBaseline):
         None: the radius is fixed.
     resolved : float, optional
         As that of a `ContactBaseline`, m.
-    overlap : TouchedSurface
-        The field e = R − s_m, on the lattice of `touched`.
+    overlap : (i, j, k) array
+        What the coefficients of the field e = R − s_m are more than those of `touched`, m. A file holds this
+        difference: the digits of the distance are in `touched`.
     weight : float
         m, the weight of the overlap: 1 for all of it, ½ for Hertz's rule on smooth curved surfaces.
 
     Raises
     ------
     UsageError
-        If there is no overlap, or the radius is an input.
+        If there is no overlap, it has another lattice than `touched`, or the radius is an input.
     """
 
     name: ClassVar[str] = "overlap"
 
-    overlap: TouchedSurface | None = None
+    overlap: np.ndarray | None = None
     weight: float = 1.0
 
     def __post_init__(self) -> None:
@@ -83,33 +86,31 @@ class OverlapBaseline(ContactBaseline):
                 "A baseline by the overlap needs an overlap of a ball of one radius.",
                 fix="Make it with `ContactBaseline` where the radius is an input.",
             )
-        if not math.isclose(self.overlap.radius, self.probe_radius, rel_tol=1e-9):
+        if self.overlap.shape != self.touched.coefficients.shape or not np.isfinite(self.overlap).all():
             raise UsageError(
-                f"An overlap of a ball of {self.overlap.radius:g} m does not fit one of {self.probe_radius:g} m.",
+                f"An overlap of {self.overlap.shape} numbers does not fit a surface of "
+                f"{self.touched.coefficients.shape}.",
+                fix="Make it with `Overlap.of` on the touched surface.",
+            )
+        if not math.isclose(self.touched.radius, self.probe_radius, rel_tol=1e-9):
+            raise UsageError(
+                f"An overlap of a ball of {self.touched.radius:g} m does not fit one of {self.probe_radius:g} m.",
                 fix="Make the overlap on a surface of the probe's radius.",
             )
 
     def __str__(self) -> str:
         return f"{super().__str__()}, by its overlap (weight {self.weight:g})"
 
-    @property
+    @cached_property
     def pressed(self) -> TouchedSurface:
         """The field e from which the law's depth is counted."""
         assert self.overlap is not None
-        return self.overlap
+        return replace(self.touched, coefficients=self.touched.coefficients + self.overlap)
 
     @property
     def surfaces(self) -> tuple[TouchedSurface, ...]:
         """The touched surface and the field of the overlap."""
         return self.touched, self.pressed
-
-    def with_surface(self, surface: TouchedSurface) -> OverlapBaseline:
-        """Return the same contact on another surface, whose inner reach is that of the overlap, too."""
-        return replace(self, touched=surface, overlap=replace(self.pressed, inner=surface.inner))
-
-    def raised(self, height: float, surface: TouchedSurface) -> OverlapBaseline:
-        """Return the same contact on a surface that is higher by `height` (m) along its normal."""
-        return replace(self, touched=surface, overlap=self.pressed.raised(height))
 
     def law_depth(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return s_m (N,) in m, −∇s_m (N, 3) and −∇²s_m (N, 3, 3) at inputs X (N, n)."""
@@ -130,6 +131,21 @@ class OverlapBaseline(ContactBaseline):
         return Compiled(
             None, (numbers, surface, self.pressed.compiled()), enter=_enter_overlap, leave=_leave_overlap
         )
+
+    def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
+        """Return the contact law at the equivalent depth of the overlap."""
+        assert touch is not None  # it has a surface
+        e, slope, bend = touch.distance_to(self.pressed)(place)
+        measured = self.radius - e
+        depth = measured
+        ends = (SMALLEST, measured < touch.depth * SMALLEST), (LARGEST, measured > touch.depth * LARGEST)
+        for factor, off in ends:
+            depth, slope = (
+                graph.where(off, touch.depth * factor, depth),
+                graph.where(off, touch.normal * factor, slope),
+            )
+            bend = graph.where(off.spread(2), touch.bend * factor, bend)
+        return self._law_form(graph, graph.where(touch.contact, depth, 1.0), slope, bend)
 
     def c_source(self) -> str:
         """Return the kernels in C99, those of a contact before them."""

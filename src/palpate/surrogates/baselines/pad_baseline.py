@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from palpate.checks import own_arrays
 from palpate.kernels import part
 from palpate.surrogates.baselines.baseline import Baseline, register_baseline
 from palpate.surrogates.baselines.constant_baseline import require_axes
+from palpate.surrogates.baselines.graph_form import BaselineForm, Graph, Touch, Value
 from palpate.surrogates.baselines.rest_stiffness import RestStiffness, entries, monomials, root_at
 from palpate.surrogates.baselines.stiffening import Stiffening, stiffening_into
 from palpate.surrogates.energy_kernels import GRADIENT, HESSIAN, OTHER, ROOT, SURFACE, VECTORS, Compiled
@@ -92,6 +93,70 @@ class PadBaseline(Baseline):
         """Return the kernels and their arguments, with scratch for one thread."""
         args = (self.axes, *self.rest.compiled(), *self.stiffening.compiled())
         return Compiled(None, args, enter=_enter, rest=_rest, log=_log)
+
+    def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
+        """Return ½ ‖S u‖² and its derivatives, with S at the scaled inputs after the felt ones."""
+        D = self.axes
+        k = len(D)
+        coefficients, pairs = self.rest.compiled()
+        terms = []
+        one = xi.columns(0, 1) * 0.0 + 1.0
+        for first, second in pairs.tolist():
+            term = one
+            for at in (first, second):
+                if at >= 0:
+                    term = term * xi.columns(k + at, k + at + 1)
+            terms.append(term)
+        upper = (terms[0] if len(terms) == 1 else graph.join(*terms)) @ coefficients
+        i, j = np.triu_indices(k)
+        spread = np.zeros((len(i), k * k))  # from the entries i ≤ j to the whole matrix
+        spread[np.arange(len(i)), i * k + j] = 1.0
+        spread[np.arange(len(i)), j * k + i] = 1.0
+        S = (upper @ spread).rows_as(k, k)
+        u = (place @ D.T).spread(2)
+        v = S @ u
+        gradient = (S @ v).rows_as(k) @ D
+        hessian = graph.constant(D.T) @ (S @ S) @ D
+        twice = (v * v).sum(1).rows_as(1)
+        if k == 1:
+            return BaselineForm(0.5 * twice, gradient, hessian, v.rows_as(1), S.rows_as(1) @ D)
+        root = graph.sqrt(twice)
+        by = graph.where(root > 0.0, gradient / graph.where(root > 0.0, root, 1.0), 0.0)
+        return BaselineForm(0.5 * twice, gradient, hessian, root, by)
+
+    def graph_exponent(self, graph: Graph, xi: Value, half: np.ndarray) -> tuple[Value, Value, Value] | None:
+        """Return the polynomial P of all scaled inputs, which is part of ℓ, with its slopes by the felt ones."""
+        coefficients, exponents = self.stiffening.coefficients, self.stiffening.exponents
+        if not len(coefficients):
+            return None
+        n, highest, k = exponents.shape[1], int(exponents.max()), len(self.axes)
+        columns = [xi.columns(i, i + 1) for i in range(n)]
+        powers = [[columns[i] * 0.0 + 1.0] for i in range(n)]
+        for i in range(n):
+            for _ in range(highest):
+                powers[i].append(powers[i][-1] * columns[i])
+
+        def total(*by: int) -> Value:
+            """Return the polynomial, differentiated by some of the scaled inputs."""
+            value: Value = columns[0] * 0.0
+            for c, row in zip(coefficients.tolist(), exponents.tolist(), strict=True):
+                left, factor = list(row), float(c)
+                for i in by:
+                    factor *= left[i]
+                    left[i] -= 1
+                if factor == 0.0:
+                    continue
+                term: Any = factor
+                for i, power in enumerate(left):
+                    if power > 0:
+                        term = powers[i][power] * term
+                value = value + term
+            return value
+
+        gradient = graph.join(*[total(i) * (1.0 / half[i]) for i in range(k)])
+        entries = [total(i, j) * (1.0 / (half[i] * half[j])) for i in range(k) for j in range(k)]
+        hessian = graph.join(*entries).rows_as(k, k)
+        return total(), gradient, hessian
 
     def c_source(self) -> str:
         """Return the kernels in C99."""

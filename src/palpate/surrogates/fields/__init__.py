@@ -2,6 +2,7 @@
 
 ::
 
+    field                  Field, the contract, and which fields of a surrogate are of which kind
     field_surrogate        FieldSurrogate, the whole of it, and its errors
     depth_amplitude        how a field grows with depth
     node_field             NodeField, at the nodes of a body that loads bend
@@ -14,6 +15,7 @@
 """
 
 from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
+from palpate.surrogates.fields.field import Field, line_of, modal_fields, surface_fields
 from palpate.surrogates.fields.field_evaluator import FieldEvaluator
 from palpate.surrogates.fields.field_surrogate import FieldErrors, FieldSurrogate
 from palpate.surrogates.fields.local_mode import LocalMode, Variation
@@ -24,6 +26,7 @@ from palpate.surrogates.fields.places import AxisPlaces, MeshPlaces
 __all__ = [
     "AxisPlaces",
     "DepthAmplitude",
+    "Field",
     "FieldErrors",
     "FieldEvaluator",
     "FieldSurrogate",
@@ -34,4 +37,7 @@ __all__ = [
     "NodeEvaluator",
     "NodeField",
     "Variation",
+    "line_of",
+    "modal_fields",
+    "surface_fields",
 ]

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -22,16 +22,18 @@ from palpate.dataset.carried_surface import CarriedSurface
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.network import Network
+from palpate.network.kinds import register_kind
 from palpate.network.network_kernels import Precision
 from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.continuation import Continuation
 from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
+from palpate.surrogates.fields.field import Field
 from palpate.surrogates.fields.field_evaluator import FieldEvaluator
 from palpate.surrogates.fields.field_kernels import moving_values, profile_arguments
 from palpate.surrogates.fields.local_mode import LocalMode
 from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation, node_normals
 from palpate.surrogates.surface import TouchedSurface
-from palpate.units import Range, bounds
+from palpate.units import bounds
 
 if TYPE_CHECKING:
     from palpate.surrogates.energy import LearntEnergy
@@ -101,8 +103,8 @@ class FieldErrors:
 _ARRAYS = ("modes", "rest", "points", "mass")
 
 
-@dataclass(frozen=True, eq=False)
-class FieldSurrogate:
+@dataclass(frozen=True, eq=False, repr=False)
+class FieldSurrogate(Field):
     """A field as a value, kept in the file of its body.
 
     Attributes
@@ -143,6 +145,8 @@ class FieldSurrogate:
     UsageError
         If the parts do not fit together.
     """
+
+    carrier: ClassVar[Literal["surface"]] = "surface"
 
     name: str
     unit: str
@@ -223,18 +227,11 @@ class FieldSurrogate:
             f"({self.amplitude.name} law), {count(self.network.units, 'unit')}"
         )
 
-    __repr__ = __str__
-
     @property
     def _local_mode_in_words(self) -> str:
         if self.local_mode is None:
             return ""
         return " and a local mode" if self.local_mode.variation is None else " and a local mode that varies"
-
-    @property
-    def inputs(self) -> tuple[Range, ...]:
-        """Names and trained ranges of all inputs: the centre's coordinates (m), then the further ones."""
-        return self.network.inputs
 
     def fault_beside(self, energy: LearntEnergy) -> str:
         """Return what does not fit the energy of the same body; "" if all does."""
@@ -243,8 +240,11 @@ class FieldSurrogate:
             theirs = surface.arrays()
             if not all(np.array_equal(theirs[k], own[k], equal_nan=True) for k in own):
                 return "it has another touched surface"
-        names = [(r.name, r.unit) for r in self.inputs]
-        return "" if names == [(r.name, r.unit) for r in energy.inputs] else "it has other inputs"
+        return super().fault_beside(energy)
+
+    def with_surface(self, surface: TouchedSurface) -> FieldSurrogate:
+        """Return the field over another touched surface."""
+        return replace(self, surface=surface)
 
     @property
     def pictured(self) -> tuple[np.ndarray, np.ndarray]:
@@ -385,3 +385,6 @@ class FieldSurrogate:
     def evaluator(self, *, precision: Precision = "single") -> FieldEvaluator:
         """The allocation-free evaluator of a picture's path."""
         return FieldEvaluator(self, precision)
+
+
+register_kind(Field, FieldSurrogate, "FieldSurrogate")

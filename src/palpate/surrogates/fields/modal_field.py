@@ -11,27 +11,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
 from palpate.format import count, plain
-from palpate.network import Network
+from palpate.network import Network, TrainedRegion
+from palpate.network.kinds import register_kind
 from palpate.network.network_kernels import Precision
+from palpate.surrogates.fields.field import Field
 from palpate.surrogates.fields.places import AxisPlaces, MeshPlaces
 from palpate.surrogates.learnt_quantities import LearntQuantities
-from palpate.units import Range
-
-if TYPE_CHECKING:
-    from palpate.surrogates.energy import LearntEnergy
 
 __all__ = ["ModalEvaluator", "ModalField"]
 
 
-@dataclass(frozen=True, eq=False)
-class ModalField:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalField(Field):
     """A field at P places with C components each, as a value, kept in the file of its surrogate.
 
     Attributes
@@ -56,12 +54,18 @@ class ModalField:
         JSON-able record of its training: ``truncation`` and ``truncation_left_out`` (root mean square that the modes
         miss, of the solves learnt from and of others), ``left_out_p95`` (95th percentile of the error over places and
         solves left out) and ``range`` (largest less least value), in the field's unit.
+    solved_at : (N, n), optional
+        Inputs of the solves that it was learnt from, SI units.
+    solved : (N, k), optional
+        Coefficients of these solves in the modes: what was solved, up to what the modes miss.
 
     Raises
     ------
     UsageError
         If the parts do not fit together.
     """
+
+    carrier: ClassVar[Literal["places"]] = "places"
 
     name: str
     unit: str
@@ -73,11 +77,17 @@ class ModalField:
     widening: float = 1.0
     components: tuple[str, ...] = ()
     meta: Mapping[str, Any] = field(default_factory=dict)
+    solved_at: np.ndarray | None = None
+    solved: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        own_arrays(self, "mean", "modes", "scatter")
+        own_arrays(self, "mean", "modes", "scatter", "solved_at", "solved")
         k, shape = len(self.coefficients.outputs), (len(self.places), max(1, len(self.components)))
         fits = self.mean.shape == self.scatter.shape == shape and self.modes.shape == (k, *shape)
+        at, solved = self.solved_at, self.solved
+        fits &= (at is None) == (solved is None)
+        if at is not None and solved is not None:
+            fits &= at.shape == (len(solved), len(self.inputs)) and solved.shape[1:] == (k,)
         if not (fits and all(np.isfinite(a).all() for a in (self.mean, self.modes, self.scatter))):
             raise UsageError(
                 f"The field {self.name!r} can't be made of {k} coefficients and modes {self.modes.shape}.",
@@ -91,27 +101,30 @@ class ModalField:
         unit = f" ({self.unit})" * bool(self.unit)
         return f"field {self.name}{unit} at {self.places}: {count(len(self.modes), 'mode')}{words}"
 
-    __repr__ = __str__
-
     @property
-    def network(self) -> Network:
+    def network(self) -> Network:  # type: ignore[override]
         """The network of the coefficients."""
         return self.coefficients.network
 
     @property
-    def inputs(self) -> tuple[Range, ...]:
-        """Names, units and trained ranges of the n inputs."""
-        return self.coefficients.inputs
+    def region(self) -> TrainedRegion | None:
+        """The trained region of the coefficients."""
+        return self.coefficients.region
 
     @property
-    def is_curve(self) -> bool:
+    def is_curve(self) -> bool:  # type: ignore[override]
         """True where its places are points of an axis."""
-        return isinstance(self.places, AxisPlaces)
+        return self.axis is not None
 
-    def fault_beside(self, energy: LearntEnergy) -> str:
-        """Return what does not fit the energy of the same body; "" if all does."""
-        names = [(r.name, r.unit) for r in self.inputs]
-        return "" if names == [(r.name, r.unit) for r in energy.inputs] else "it has other inputs"
+    @property
+    def axis(self) -> AxisPlaces | None:
+        """The axis of a curve; None of a field over a mesh."""
+        return self.places if isinstance(self.places, AxisPlaces) else None
+
+    @property
+    def mesh(self) -> MeshPlaces | None:
+        """The mesh of a field; None of a curve."""
+        return self.places if isinstance(self.places, MeshPlaces) else None
 
     def values(self, X: np.ndarray) -> np.ndarray:
         """Return the field (N, P, C) at inputs X (N, n).
@@ -154,6 +167,9 @@ class ModalField:
     def evaluator(self, *, precision: Precision = "single") -> ModalEvaluator:
         """Return the allocation-free evaluator of a picture's path."""
         return ModalEvaluator(self, precision)
+
+
+register_kind(Field, ModalField, "ModalField")
 
 
 class ModalEvaluator:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -20,8 +20,10 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.kernels import kernel
 from palpate.network import Network
+from palpate.network.kinds import register_kind
 from palpate.network.network_kernels import point_into
-from palpate.units import Range, bounds
+from palpate.surrogates.fields.field import Field
+from palpate.units import bounds
 
 if TYPE_CHECKING:
     from palpate.surrogates.energy import LearntEnergy
@@ -31,8 +33,8 @@ __all__ = ["NodeEvaluator", "NodeField"]
 AskedBy = Literal["load", "place and load"]
 
 
-@dataclass(frozen=True, eq=False)
-class NodeField:
+@dataclass(frozen=True, eq=False, repr=False)
+class NodeField(Field):
     """A field at nodes as a value, kept in the file of its body.
 
     Attributes
@@ -66,6 +68,9 @@ class NodeField:
     UsageError
         If the parts do not fit together.
     """
+
+    carrier: ClassVar[Literal["line"]] = "line"
+    asked_as_body: ClassVar[bool] = False
 
     name: str
     unit: str
@@ -101,9 +106,6 @@ class NodeField:
                 fix="Let `palpate.learn` make it of one set of solves.",
             )
 
-    def __repr__(self) -> str:
-        return str(self)
-
     def __str__(self) -> str:
         inputs = ", ".join(str(r) for r in self.inputs)
         return (
@@ -115,11 +117,6 @@ class NodeField:
         """Which of the inputs are loads that the hand does not supply."""
         first = len(self.touched) if self.asked_by == "place and load" else 0
         return tuple(i for i in range(first, len(self.inputs)) if i not in self.touched)
-
-    @property
-    def inputs(self) -> tuple[Range, ...]:
-        """Names and trained ranges of the network's inputs."""
-        return self.network.inputs
 
     def fault_beside(self, energy: LearntEnergy) -> str:
         """Return what does not fit the energy of the same body; "" if all does."""
@@ -158,6 +155,9 @@ class NodeField:
             Unit directions of the touched loads.
         """
         return NodeEvaluator(self, directions)
+
+
+register_kind(Field, NodeField, "NodeField")
 
 
 class NodeEvaluator:

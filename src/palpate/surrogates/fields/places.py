@@ -63,6 +63,11 @@ class MeshPlaces:
     def __len__(self) -> int:
         return len(self.coordinates)
 
+    @property
+    def is_surface(self) -> bool:
+        """True where values at the places can be drawn on triangles."""
+        return len(self.triangles) > 0 and (self.kind == "nodes" or len(self.cell_of) > 0)
+
     def __str__(self) -> str:
         return count(len(self), "node" if self.kind == "nodes" else "cell")
 

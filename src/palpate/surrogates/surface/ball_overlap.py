@@ -43,17 +43,14 @@ from palpate.surrogates.surface.touched_surface import TouchedSurface
 __all__ = ["Overlap", "plane_overlaps"]
 
 LEAST, MOST = 0.04, 0.7  # depths over the radius, between which k is measured
-TURNED, FACING = (
-    0.0,
-    0.3,
-)  # cosines between the surface's normal and the way to the ball's centre, where w is 0 and 1
+# cosines between the surface's normal and the way to the ball's centre, where w is 0 and 1
+TURNED, FACING = 0.0, 0.3
 NARROWEST, WIDEST = 0.4, 3.0  # bounds of k: beyond them a place is not like a press on a plane any more
 FINE = 20  # parts of the radius, of which one is the longest edge of a piece of the surface
 MOST_PIECES = 3_000_000  # pieces of the surface, at most: 170 MB
 DEEPEST = -0.5  # distance over the radius, inside from which k is 1
-GRAIN = (
-    14  # the field is rounded to 2⁻¹⁴ to 2⁻¹³ of the spacing: finer digits are those of the sum over pieces
-)
+# e − d is rounded to 2⁻¹² to 2⁻¹¹ of the spacing: finer digits are those of the sum over pieces
+GRAIN = 12
 QUANTUM = 2.0**-12  # of ln k, in files
 
 
@@ -101,15 +98,20 @@ class Overlap:
         log_ratio[tuple(near.T)] = QUANTUM * np.rint(share * np.log(ratio) / QUANTUM)
         return cls(surface, log_ratio)
 
-    def field(self, weight: float) -> TouchedSurface:
-        """Return the field e = R − s kᵐ for a weight m: it stands in a contact law where the distance stands."""
+    def change(self, weight: float) -> np.ndarray:
+        """Return what the coefficients of the field e = R − s kᵐ are more than those of d, in m, for a weight m.
+
+        e stands in a contact law where the distance stands.
+        """
         surface = self.surface
-        d = _node_values(surface.coefficients)
-        s = surface.radius - d
-        change = s - s * np.exp(weight * self.log_ratio)
+        s = surface.radius - _node_values(surface.coefficients)
         grain = 2.0 ** (math.frexp(surface.spacing)[1] - GRAIN)
-        moved = surface.coefficients + grain * np.rint(through_nodes(change, surface.spacing) / grain)
-        return replace(surface, coefficients=moved).round_to_quanta()
+        change = through_nodes(s - s * np.exp(weight * self.log_ratio), surface.spacing)
+        return np.asarray(grain * np.rint(change / grain) + 0.0)
+
+    def field(self, weight: float) -> TouchedSurface:
+        """Return the field e for a weight m."""
+        return replace(self.surface, coefficients=self.surface.coefficients + self.change(weight))
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Everything but the surface as arrays, for a file."""

@@ -75,8 +75,8 @@ def answer_errors(subject: Subject) -> AnswerErrors | None:
     errors = [one for group in found for one in group]
     errors += [
         _of_field(shown, truth.fields[name], truth.X)
-        for name, shown in surrogate.fields.items()
-        if isinstance(shown, ModalField) and name in truth.fields
+        for name, shown in surrogate.modal_fields.items()
+        if name in truth.fields
     ]
     if not errors:
         raise UsageError(

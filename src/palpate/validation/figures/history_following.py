@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.dataset import Dataset, LoadHistory, histories_of
 from palpate.errors import UsageError
 from palpate.format import length, plain, share
-from palpate.learning.plastic import LoadHistories, LoadHistory
 from palpate.surrogates import NodeField, Surrogate
 from palpate.validation.figures.figure import Figure, Measured
-from palpate.validation.subject import Subject, line_of
+from palpate.validation.subject import Subject
 
 __all__ = ["Followed", "HistoryErrors", "follow_unseen", "history_following"]
 
@@ -126,18 +126,18 @@ def history_following(subject: Subject) -> HistoryErrors | None:
     )
 
 
-def follow_unseen(body: Surrogate, test: LoadHistories) -> list[Followed]:
+def follow_unseen(body: Surrogate, test: Dataset) -> list[Followed]:
     """Return a body led along each history; they must be of its mesh."""
-    if not test.paths:
+    paths, field = histories_of(test), body.line
+    if not paths:
         raise UsageError("There is no history to test with.", fix="Lead the body through some.")
-    field = line_of(body)
     assert field is not None  # the subject's own check
     if test.rest.shape != field.points[:, :2].shape or not np.allclose(test.rest, field.points[:, :2]):
         raise UsageError(
             f"The histories' {len(test.rest)} nodes are not the {len(field.points)} nodes of {body.name}.",
             fix="Test with histories of the body that it was learnt from.",
         )
-    return [_followed(body, field, path) for path in test.paths]
+    return [_followed(body, field, path) for path in paths]
 
 
 def _followed(body: Surrogate, field: NodeField, path: LoadHistory) -> Followed:

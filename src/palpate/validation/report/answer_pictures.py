@@ -29,8 +29,8 @@ def answer_pictures(chapter: Chapter, key: str) -> list[Picture]:
     truth = DatasetAnswers.of(subject.data, to_learn=False)
     made = []
     for i, one in enumerate(errors):
-        shown = subject.answering.fields.get(one.name)
-        if isinstance(shown, ModalField) and one.name in truth.fields:
+        shown = subject.answering.modal_fields.get(one.name)
+        if shown is not None and one.name in truth.fields:
             row = _row_of(one, truth.X)
             made.append(_picture(f"{key}-answer{i}", one, shown, truth.fields[one.name], truth.X[row], row))
     return made
@@ -48,15 +48,19 @@ def _picture(
     solved, answered = truth.values[row], shown.values(x[None])[0]
     spread = shown.deviation(x[None])[0]
     off = f"95 of 100 values are within {share(error.p95)} of the range."
-    places = shown.places
+
+    def draw() -> Figure:
+        if shown.axis is not None:
+            return plot_curve(shown.axis, solved, answered, spread, shown.name, shown.unit)
+        assert shown.mesh is not None  # places are one of the two
+        return plot_field(shown.mesh, solved, answered, shown.name, shown.unit)
+
     return picture(
         key,
         f"{error.name}, worst case",
         f"{error.name} of the worst unseen case, solved and by the surrogate, {error.worst}. {off}",
         f"The unseen case that is farthest off, {error.worst}: {share(error.largest)} of the range. {off}",
-        (lambda: plot_curve(places, solved, answered, spread, shown.name, shown.unit))
-        if isinstance(places, AxisPlaces)
-        else (lambda: plot_field(places, solved, answered, shown.name, shown.unit)),
+        draw,
     )
 
 

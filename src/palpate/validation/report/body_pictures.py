@@ -27,11 +27,9 @@ REST, MOVED = (
 
 def body_pictures(chapter: Chapter, key: str) -> list[Picture]:
     """Draw the body under the deepest unseen touch; nothing for a body whose surface is not known."""
-    model, test = chapter.model, chapter.subject.solves
-    if test is None or not len(test.X) or not isinstance(model, Surrogate):
-        return []
-    field = model.fields.get("displacement")
-    if not isinstance(field, FieldSurrogate) or field.rest.shape[1] != 3:
+    model, test = chapter.surrogate, chapter.subject.solves
+    field = chapter.subject.field
+    if test is None or model is None or field is None or field.rest.shape[1] != 3:
         return []
     depths = model.hand_energy.depth(test.X)
     x = test.X[int(np.argmax(depths))]

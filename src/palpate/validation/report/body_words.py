@@ -36,9 +36,7 @@ def body_words(provenance: Mapping[str, Any]) -> str:
 
 def solid_words(data: Any) -> str:
     """Return a solid body in one sentence: shape, size, mesh, materials, supports, what acts on it; may be empty."""
-    if not isinstance(data, Dataset):
-        return ""
-    problem = data.provenance.get("problem", {})
+    problem = getattr(data, "provenance", {}).get("problem", {})
     body, acting = problem.get("body", {}), problem.get("interactions", [])
     if "body" in body:  # a family
         body = body["body"]

@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from palpate.dataset import Dataset
 from palpate.learning import History
-from palpate.learning.learn_dataset import filter_record
+from palpate.learning.learn_dataset import LearningHistory, filter_record
+from palpate.surrogates import Surrogate
 from palpate.validation.figures.history_following import Followed, follow_unseen
 from palpate.validation.subject import Subject
 from palpate.validation.touch_comparison import TouchComparison
+from palpate.validation.unseen_solves import TouchFunction, TouchSolves
 from palpate.validation.validate import Validation
 
 __all__ = ["Chapter"]
@@ -29,11 +32,11 @@ class Chapter:
         Its heading.
     model : Surrogate
         What was learnt.
-    test : Dataset, TouchSolves or load histories
+    test : Dataset or TouchSolves
         Solves that were not learnt from.
     validation : Validation
         Of `model` on `test`.
-    train : Dataset or load histories, optional
+    train : Dataset, optional
         Solves that were learnt from.
     history : LearningHistory or History, optional
         What `palpate.learn` returned beside the model, or the record of a sequential filter alone.
@@ -52,17 +55,22 @@ class Chapter:
     """
 
     name: str
-    model: Any
-    test: Any
+    model: Surrogate | TouchFunction
+    test: Dataset | TouchSolves
     validation: Validation
-    train: Any = None
-    history: Any = None
+    train: Dataset | None = None
+    history: LearningHistory | History | None = None
     rivals: Mapping[str, Any] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     timings: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     comparisons: Sequence[TouchComparison] = ()
     advice: str = ""
+
+    @property
+    def surrogate(self) -> Surrogate | None:
+        """The model, where it is a surrogate and no function of a place alone."""
+        return self.model if isinstance(self.model, Surrogate) else None
 
     @property
     def filter(self) -> History | None:
@@ -91,11 +99,12 @@ class Chapter:
     def learnt_from(self) -> np.ndarray:
         """Inputs (N, n) of the solves that were learnt from, as far as they are known: their number is the one told."""
         X = getattr(getattr(self.train, "ok", self.train), "X", None)
-        if X is None or np.ndim(X) != 2 or not len(X):
+        if X is None or np.ndim(X) != 2 or not len(X) or self.subject.histories is not None:
             return np.zeros((0, 0))
         if self.subject.solves is None or np.shape(X)[1] != self.subject.solves.X.shape[1]:
             return np.asarray(X)
-        touching = np.asarray(X)[self.model.energy.baseline.coordinate(np.asarray(X)) > 0]
+        assert self.surrogate is not None
+        touching = np.asarray(X)[self.surrogate.hand_energy.baseline.coordinate(np.asarray(X)) > 0]
         # later ones may have made no better surrogate
         return np.asarray(touching[: int(self.meta.get("solves", len(touching)))])
 

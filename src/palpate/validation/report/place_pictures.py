@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.format import count
-from palpate.surrogates import FieldSurrogate, LearntEnergy, Surrogate
+from palpate.surrogates import FieldSurrogate, LearntEnergy
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.style import BLUE, INK, ORANGE, Picture, figure, picture
 from palpate.validation.report.touch_pictures import View, contact_points
@@ -22,11 +22,11 @@ SMALL, LARGE = 10.0, 70.0  # points², areas of the dots of the shallowest and t
 
 def place_pictures(chapter: Chapter, key: str) -> list[Picture]:
     """Draw where the ball went; nothing for models that are not touched on a surface."""
-    model, test = chapter.model, chapter.subject.solves
-    if test is None or not isinstance(model, Surrogate) or model.hand_energy.baseline.surface is None:
+    model, test = chapter.surrogate, chapter.subject.solves
+    if test is None or model is None or model.hand_energy.baseline.surface is None:
         return []
     learnt = chapter.learnt_from if chapter.learnt_from.shape[1] == test.X.shape[1] else test.X[:0]
-    field = next((f for f in model.fields.values() if isinstance(f, FieldSurrogate)), None)
+    field = next(iter(model.surface_fields.values()), None)
     told = f"{count(len(test.X), 'unseen solve')}"
     if len(learnt):
         told = f"{count(len(learnt), 'solve')} to learn from and {told}"

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import cast
 
+from palpate.dataset import Dataset
 from palpate.format import count, interval, length, plain, scientific, share
 from palpate.input_words import input_in_words
 from palpate.surrogates.rigid_ball import pad_part_of
@@ -14,7 +16,6 @@ from palpate.validation.figures.history_following import HistoryErrors
 from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
 from palpate.validation.report.body_words import body_words, solid_words, strain_words
 from palpate.validation.report.chapter import Chapter
-from palpate.validation.subject import line_of
 from palpate.validation.validate import Validation
 
 __all__ = ["Fact", "Story", "felt", "story"]
@@ -111,8 +112,9 @@ def _facts(chapter: Chapter) -> Iterator[Fact]:
     v, subject = chapter.validation, chapter.subject
     for one in v.answers or ():
         yield Fact(share(one.p95), f"error of {one.name} over its range, for 95 of 100 values")
-    if (line := line_of(chapter.model)) is not None:
-        ends = chapter.model.energy.inputs[: len(line.touched)]
+    model = chapter.surrogate
+    if model is not None and (line := model.line) is not None:
+        ends = model.hand_energy.inputs[: len(line.touched)]
         reach = math.hypot(*(max(abs(r.low), abs(r.high)) for r in ends))
         yield Fact(length(reach), "farthest trained displacement of the held node")
     if subject.function is not None and subject.function.depth is not None:
@@ -122,7 +124,7 @@ def _facts(chapter: Chapter) -> Iterator[Fact]:
     if errors is not None:
         largest = errors.largest_force if v.histories else errors.largest
         yield Fact(f"{plain(largest, 3)} N", "largest force on the hand in the test")
-    energy = getattr(chapter.model, "energy", None)
+    energy = None if model is None else model.energy
     part = None if energy is None else pad_part_of(energy, chapter.meta)
     if part is not None:
         yield Fact(share(part.depth_share), str(part))
@@ -165,7 +167,7 @@ def _solves_in_words(chapter: Chapter) -> str:
 
 
 def _solved_by_load(chapter: Chapter) -> str:
-    test = chapter.test
+    test = cast("Dataset", chapter.test)  # the subject's own check
     train = test if chapter.train is None else chapter.train
     loads = ", ".join(
         f"{input_in_words(r.name)} from {r.low:g} to {r.high:g} {r.unit}".rstrip()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.format import share
-from palpate.surrogates import LearntEnergy, Surrogate, TouchedSurface
+from palpate.surrogates import LearntEnergy, TouchedSurface
 from palpate.validation.figures.smoothness import Smoothness
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.style import INK, Picture, figure, loads_map, picture, series
@@ -45,14 +45,9 @@ MARKED = 5  # worst solves that get a mark
 
 def touch_pictures(chapter: Chapter, key: str) -> list[Picture]:
     """Draw the pictures of a body that is touched on a surface; none of other models."""
-    model, test, v = chapter.model, chapter.subject.solves, chapter.validation
+    model, test, v = chapter.surrogate, chapter.subject.solves, chapter.validation
     samples = chapter.subject.samples
-    if (
-        test is None
-        or samples is None
-        or not isinstance(model, Surrogate)
-        or model.hand_energy.baseline.surface is None
-    ):
+    if test is None or samples is None or model is None or model.hand_energy.baseline.surface is None:
         return []
     energy = model.hand_energy
     off = "No touch was strong enough to judge in relative terms."

@@ -26,6 +26,7 @@ export class AnswerBody {
   private readonly canvas = element<HTMLCanvasElement>("view");
   private chosen: number;
   private view: AnswerView;
+  private solve: number | null = null; // number of the solve that is drawn beside
   private probed: { place: Place; mesh: number; kind: string } | null = null;
 
   constructor(parts: AnswerParts, wanted: string | null, changed: () => void) {
@@ -66,10 +67,16 @@ export class AnswerBody {
     return this.now.info.name;
   }
 
-  /** Answer other inputs. */
-  ask(x: readonly number[]): void {
+  /** Answer other inputs, with a solve beside, by its number, where one is to be drawn. */
+  ask(x: readonly number[], solve: number | null): void {
     for (const { modes } of this.fields) modes.ask(x);
+    this.solve = solve;
     this.draw();
+  }
+
+  /** Whether the solves that the fields were learnt from can be drawn. */
+  get hasSolves(): boolean {
+    return this.fields.every(({ modes }) => modes.hasSolves);
   }
 
   look(): void {
@@ -112,23 +119,32 @@ export class AnswerBody {
     const { field, scale, info } = this.now;
     const { surface, source, moved } = this.surfaces[field]!;
     const { modes } = this.fields[field]!;
-    const { mover } = this;
-    const displacement = new Float32Array(surface.rest.length);
-    if (mover) {
-      const { columns, values } = mover.modes;
+    const { mover, solve } = this;
+    const displaced = (all: Float64Array | undefined): Float32Array => {
+      const displacement = new Float32Array(surface.rest.length);
+      if (!mover || !all) return displacement;
+      const { columns } = mover.modes;
       moved.forEach((row, i) => {
-        for (let k = 0; k < columns; k++) displacement[3 * i + k] = values[row * columns + k]!;
+        for (let k = 0; k < columns; k++) displacement[3 * i + k] = all[row * columns + k]!;
       });
-    }
+      return displacement;
+    };
     const values = Float32Array.from(source, (row) => modes.at(row, scale.component));
     const factor = mover ? this.factors[input("answer-factor").valueAsNumber]! : 0;
-    this.view.deform(displacement, factor, shares(info, values), null, { ghost: factor > 0, mesh: false });
+    this.view.deform(displaced(mover?.modes.values), factor, shares(info, values), null, { ghost: factor > 0, mesh: false });
+    if (solve === null) this.view.beside(null);
+    else {
+      const solved = modes.solve(solve);
+      const theirs = Float32Array.from(source, (row) => modes.at(row, scale.component, solved));
+      this.view.beside({ displacement: displaced(mover?.modes.solve(solve)), factor, shares: shares(info, theirs) });
+    }
     legend(info);
     largest(info, values);
     element("answer-factor-label").textContent = `× ${tidy(factor)}`;
+    const right = solve === null ? "" : "right: the nearest solve, left: the model";
     const drawn = !mover ? "" : factor === 1 ? "displacement to scale" : `displacement drawn × ${tidy(factor)}`;
     element("scale-notes").replaceChildren(
-      ...[drawn, `grid ${measured(this.view.cell, "m")}`].filter(Boolean).map((words) => worded("div", words)),
+      ...[right, drawn, `grid ${measured(this.view.cell, "m")}`].filter(Boolean).map((words) => worded("div", words)),
     );
     this.read();
   }

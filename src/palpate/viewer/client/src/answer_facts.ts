@@ -59,6 +59,7 @@ export interface ModesFacts extends Named {
   modes: ArrayFacts;
   scatter: ArrayFacts;
   widening: number | null;
+  solved: ArrayFacts | null; // coefficients of the solves that it was learnt from, in the order of their inputs
 }
 
 export interface CurveFacts extends ModesFacts {

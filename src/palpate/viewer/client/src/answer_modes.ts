@@ -11,6 +11,7 @@ export class Modes {
   private readonly modes: Numbers;
   private readonly scatter: Numbers;
   private readonly widening: number;
+  private readonly solved: Numbers | null;
   private spread: number[] = [];
 
   constructor(parts: AnswerParts, facts: ModesFacts) {
@@ -18,18 +19,34 @@ export class Modes {
     [this.mean, this.modes, this.scatter] = [facts.mean, facts.modes, facts.scatter].map((a) => parts.numbers(a)) as [Numbers, Numbers, Numbers];
     this.columns = facts.mean.shape[1]!;
     this.widening = facts.widening ?? NaN;
+    this.solved = facts.solved && parts.numbers(facts.solved);
     this.values = new Float64Array(this.mean.length);
   }
 
   /** Answer other inputs. */
   ask(x: readonly number[]): void {
-    const { values, modes } = this;
-    const count = values.length;
+    this.sum(this.group.predict(x), this.values);
+    this.spread = this.group.deviation(x);
+  }
+
+  /** Whether the solves that it was learnt from are known. */
+  get hasSolves(): boolean {
+    return this.solved !== null;
+  }
+
+  /** Values of a solve that it was learnt from, row by row. */
+  solve(index: number): Float64Array {
+    const [values, k] = [new Float64Array(this.values.length), this.modes.length / this.values.length];
+    this.sum(Array.from(this.solved!.subarray(index * k, (index + 1) * k)), values);
+    return values;
+  }
+
+  private sum(coefficients: readonly number[], values: Float64Array): void {
+    const [count, { modes }] = [values.length, this];
     values.set(this.mean);
-    this.group.predict(x).forEach((a, k) => {
+    coefficients.forEach((a, k) => {
       for (let i = 0; i < count; i++) values[i]! += a * modes[k * count + i]!;
     });
-    this.spread = this.group.deviation(x);
   }
 
   /** Standard deviation of a component at a row, at the last inputs. */
@@ -40,8 +57,8 @@ export class Modes {
   }
 
   /** The value at a row; of component −1 the size of the vector. */
-  at(row: number, component: number): number {
-    const { columns, values } = this;
+  at(row: number, component: number, values = this.values): number {
+    const { columns } = this;
     if (component >= 0) return values[row * columns + component]!;
     let sum = 0;
     for (let k = 0; k < columns; k++) sum += values[row * columns + k]! ** 2;

@@ -49,7 +49,10 @@ class Network {
 
   scaled(x: readonly number[]): number[] {
     const n = x.length;
-    return x.map((v, i) => (v - this.inputs[i]!) / this.inputs[n + i]!);
+    return x.map((v, i) => {
+      const [far, h, b] = [v - this.inputs[i]!, this.inputs[n + i]!, this.inputs[2 * n + i]!];
+      return far / (b === 0 ? h : Math.max(h + b * far, h / (2 * (1 + Math.abs(b)))));
+    });
   }
 
   /** A ξ − b of a unit. */

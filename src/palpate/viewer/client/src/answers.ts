@@ -36,6 +36,7 @@ class AnswerSheet {
   private readonly solves: Numbers | null;
   private readonly response = new GraphSheet(element<HTMLCanvasElement>("response"));
   private readonly sliders: HTMLInputElement[];
+  private besides = false; // whether the nearest solve is drawn beside
   private x: number[];
 
   constructor(parts: AnswerParts) {
@@ -73,6 +74,7 @@ class AnswerSheet {
     const out = {
       numbers: this.groups.map((g) => ({ values: g.predict(x), deviation: g.deviation(x), trusted: g.trusted(x) })),
       fields: this.body?.fields.map(({ modes }) => modal(modes)) ?? [],
+      nearest: this.body?.hasSolves ? this.body.fields.map(({ modes }) => Array.from(modes.solve(this.nearest(x)))) : [],
       curves: this.curves.map(({ modes }) => modal(modes)),
     };
     this.answer();
@@ -121,7 +123,13 @@ class AnswerSheet {
     element("numbers-section").hidden = element("response-section").hidden = outputs.length === 0;
     element("curves-section").hidden = this.curves.length === 0;
     element("solves-section").hidden = this.solves === null;
-    element("to-nearest").addEventListener("click", () => this.go(this.nearest()));
+    element("to-nearest").addEventListener("click", () => this.go(this.solveAt(this.nearest(this.x))));
+    element("beside").hidden = !(this.solves && this.body?.hasSolves);
+    element("beside").addEventListener("click", () => {
+      this.besides = !this.besides;
+      element("beside").setAttribute("aria-pressed", String(this.besides));
+      this.answer();
+    });
     element("copy-link").addEventListener("click", () => {
       this.keepLink();
       const said = (words: string): void => void (element("copy-link").textContent = words);
@@ -162,7 +170,7 @@ class AnswerSheet {
       const { size, unit } = rangeUnit(one.low, one.high, one.unit);
       this.sliders[i]!.parentElement!.querySelector("output")!.textContent = `${tidy(x[i]! / size, 4)} ${unit}`.trimEnd();
     });
-    this.body?.ask(x);
+    this.body?.ask(x, this.besides ? this.nearest(x) : null);
     this.tellNumbers();
     this.tellRegion();
     for (const { facts, modes, sheet } of this.curves) {
@@ -235,21 +243,26 @@ class AnswerSheet {
     element("response").setAttribute("aria-label", `${group.outputs[left]!.name} over ${along.name}`);
   }
 
-  /** Inputs of the solve that is nearest in scaled inputs. */
-  private nearest(): number[] {
-    const { solves, inputs, x } = this;
+  /** Number of the solve that is nearest in scaled inputs. */
+  private nearest(x: readonly number[]): number {
+    const { solves, inputs } = this;
     const n = inputs.length;
     let [best, least] = [0, Infinity];
     for (let i = 0; i < solves!.length; i += n) {
       const far = inputs.reduce((sum, { low, high }, j) => sum + ((solves![i + j]! - x[j]!) / (high - low)) ** 2, 0);
-      if (far < least) [best, least] = [i, far];
+      if (far < least) [best, least] = [i / n, far];
     }
-    return Array.from(solves!.subarray(best, best + n));
+    return best;
+  }
+
+  private solveAt(number: number): number[] {
+    const n = this.inputs.length;
+    return Array.from(this.solves!.subarray(number * n, (number + 1) * n));
   }
 
   private tellNearest(): void {
     if (!this.solves) return;
-    const rows = this.nearest().flatMap((v, i) => {
+    const rows = this.solveAt(this.nearest(this.x)).flatMap((v, i) => {
       const one = this.inputs[i]!;
       const { size, unit } = rangeUnit(one.low, one.high, one.unit);
       return [worded("dt", one.name), worded("dd", `${tidy(v / size, 4)} ${unit}`.trimEnd())];

@@ -143,7 +143,7 @@ export class SurfaceView extends View {
     const { rest } = this.surface;
     const at = this.position.array as Float32Array;
     for (let i = 0; i < at.length; i++) at[i] = rest[i]! + factor * displacement[i]!;
-    this.tint(shares);
+    this.tint(shares, this.colour);
     normalsInto(this.facing.array as Float32Array, at, this.triangles);
     this.position.needsUpdate = this.facing.needsUpdate = this.colour.needsUpdate = true;
     this.moveDots();
@@ -157,8 +157,9 @@ export class SurfaceView extends View {
     this.dirty = true;
   }
 
-  private tint(shares: ArrayLike<number>): void {
-    const [tints, colours] = [this.colour.array, this.colours];
+  /** Colours of points by their shares of the scale. */
+  protected tint(shares: ArrayLike<number>, colour: BufferAttribute): void {
+    const [tints, colours] = [colour.array, this.colours];
     for (let i = 0; i < shares.length; i++) {
       const share = shares[i]!;
       const known = share >= UNKNOWN;

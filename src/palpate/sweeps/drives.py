@@ -6,26 +6,15 @@ import itertools
 
 import numpy as np
 
-__all__ = ["held_loads", "load_unload_reload", "random_times", "random_turns"]
+__all__ = ["even_steps", "held_loads", "load_unload_reload", "random_times", "random_turns"]
 
 
 def random_turns(
     rng: np.random.Generator, low: float, high: float, *, turns: int = 6, step: float, outward: float = 0.0
 ) -> np.ndarray:
-    """Return loads (N,) in N that go to and fro between random turning points, and back to 0.
+    """Return loads (N,) in N to and fro between random turning points, and back to 0, in steps of `step` at most.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Decides the turning points, which are even over the range.
-    low, high : float
-        Range of the loads, N.
-    turns : int
-        Number of turning points.
-    step : float
-        Largest step from load to load, N.
-    outward : float
-        Above 0 it draws the points to the ends of the range, where a body yields most.
+    The points are even over the range; `outward` above 0 draws them to its ends, where a body yields most.
     """
     share = rng.uniform(-1.0, 1.0, turns)
     share = np.sign(share) * np.abs(share) ** (1.0 / (1.0 + outward))
@@ -33,17 +22,7 @@ def random_turns(
 
 
 def load_unload_reload(rng: np.random.Generator, low: float, high: float, *, step: float) -> np.ndarray:
-    """Return loads (N,) in N: to a peak, back a part of the way, further than before, and off.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Decides the peak and the ways.
-    low, high : float
-        Range of the loads, N.
-    step : float
-        Largest step from load to load, N.
-    """
+    """Return loads (N,) in N: to a random peak, back a part of the way, further than before, and off."""
     end = high if low >= 0 or rng.random() < 0.5 else low
     peak = end * rng.uniform(0.5, 1.0)
     back, further = peak * rng.uniform(0.0, 0.8), peak + (end - peak) * rng.random()
@@ -65,16 +44,7 @@ def random_times(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return times (N,) in s and loads (N,) in N: even ramps between random loads, every third one a hold.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Decides loads and times.
-    low, high : float
-        Range of the loads, N.
-    span, step : float
-        Length and step of the times, s.
-    slowest : float
-        Longest time of a ramp, s; the shortest is 0.05 s.
+    The times go to `span` in steps of `step`, s; a ramp takes from 0.05 s to `slowest`.
     """
     times = np.arange(1, round(span / step) + 1) * step
     knots_t, knots_p = [0.0], [0.0]
@@ -88,14 +58,7 @@ def random_times(
 def held_loads(size: float, *, ramp: float, span: float, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return times (N,) in s, which grow geometrically, and loads (N,) in N that are put on and held.
 
-    Parameters
-    ----------
-    size : float
-        The load that is held, N.
-    ramp, span : float
-        Times at which it is all there and at which the hold ends, s.
-    count : int
-        Number of times during the hold.
+    The load `size`, N, is all there after `ramp`, s, and held until `span`; the hold has `count` times.
     """
     on = np.linspace(0.0, ramp, 6)[1:]
     times = np.concatenate([on, ramp + np.geomspace(ramp / 2, span - ramp, count)])

@@ -11,6 +11,7 @@ from palpate.input_words import input_in_words
     ("name", "words"),
     [
         ("p_x", "pad's place along x"),
+        ("tip_z", "tool's foremost point along z"),
         ("d_z", "pad moved along z"),
         ("finger d_z", "pad moved along z (finger)"),
         ("c_y_2", "ball's centre along y"),

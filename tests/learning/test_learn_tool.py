@@ -10,6 +10,7 @@ import pressed
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.export import export_c
+from palpate.export.onnx_export import export_onnx
 from palpate.learning.pressed_solves import PressedSolves
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.baselines import deepest_ball
@@ -26,7 +27,7 @@ def under(tool: PosedTool, touches: str = "top", count: int = 60) -> Dataset:
     """Solves of the closed form, told of as those under a tool a radius before the ball's centre."""
     acting = {"type": "SurfaceTool", "touches": touches, "depth": (0.0, DEEPEST), **tool.describe()}
     inputs = tuple(
-        pp.Range(f"p{r.name[1:]}", r.low - w, r.high - w, "m")
+        pp.Range(f"tip{r.name[1:]}", r.low - w, r.high - w, "m")
         for r, w in zip(pressed.INPUTS, WAY.tolist(), strict=True)
     )
     X = pressed.places(count)
@@ -71,12 +72,13 @@ def test_a_hand_feels_it_at_the_foremost_point(ball):
 
 @pytest.mark.full
 def test_what_does_not_know_tools_refuses_them(ball, tmp_path):
-    with pytest.raises(UsageError, match="no page draws"):
+    with pytest.raises(UsageError, match="be drawn on a page yet"):
         PageModel(touchable(ball))
-    with pytest.raises(UsageError, match="can't be exported yet"):
-        export_c(ball, tmp_path)
-    with pytest.raises(UsageError, match="tool"):
-        pp.validate(ball, pressed.dataset(pressed.solves()))
+    for export in (export_c, export_onnx):
+        with pytest.raises(UsageError, match="can't be exported yet"):
+            export(ball, tmp_path / "ball.onnx")
+    with pytest.raises(UsageError, match="solves of the tool that"):
+        pp.validate(ball, under(PosedTool(Capsule(0.006, 0.03))))
 
 
 def test_the_deepest_point_of_a_tilted_tool():

@@ -59,7 +59,7 @@ def tool() -> Example:
     radius, way = deepest_ball(posed, np.array([0.0, 0.0, 1.0]))
     # the box is that of a ball of 10 mm
     way = way + np.array([0.0, 0.0, RADIUS - radius])
-    moved = [pp.Range(f"p{r.name[1:]}", r.low - w, r.high - w, "m") for r, w in zip(BOX, way, strict=True)]
+    moved = [pp.Range(f"tip{r.name[1:]}", r.low - w, r.high - w, "m") for r, w in zip(BOX, way, strict=True)]
     frame = plane().frame - np.concatenate([way, np.zeros(len(plane().frame) - 3)])
     surface = dataclasses.replace(plane(), frame=frame)
     baseline = ToolBaseline(ContactLaw("series", 1e-3), surface, RADIUS, tool=json.dumps(posed.describe()))

@@ -126,7 +126,7 @@ def test_places_touch_the_surface_at_the_least_depth_and_fit_into_their_ranges()
     low, high = np.array([(r.low, r.high) for r in problem.ranges]).T
     assert (places >= low - 1e-12).all()
     assert (places <= high + 1e-12).all()
-    assert [r.name for r in problem.ranges] == ["p_x", "p_y", "p_z"]
+    assert [r.name for r in problem.ranges] == ["tip_x", "tip_y", "tip_z"]
 
 
 def test_its_hash_follows_from_its_shape_and_pose():
@@ -155,6 +155,10 @@ def test_a_rigid_tool_gets_its_pad_from_the_body():
         (lambda: SurfaceTool("capsule"), "one of palpate.tools"),
         (lambda: SurfaceTool(tools.Punch(0.006, 1e-4)), "0.00037|element=0.0002"),
         (lambda: SurfaceTool(tools.Punch(0.006, 1e-3), element=0.003), "edge of at least 0.0015"),
+        (
+            lambda: BODY.problem(SurfaceTool(tools.Punch(0.006, 1e-3)), element=0.003),
+            "edge of at least 0.0015",
+        ),
         (lambda: SurfaceTool(tools.Sphere(0.006), rotation=(0.1, 0.2)), "rotation"),
         (lambda: SurfaceTool(tools.Sphere(0.006), pad="soft"), "pad"),
         (

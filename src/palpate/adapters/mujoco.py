@@ -31,6 +31,7 @@ from palpate.adapters.mujoco_callbacks import call_for, forget_scene
 from palpate.errors import UsageError
 from palpate.format import millimetres
 from palpate.surrogates import Surrogate
+from palpate.surrogates.baselines import require_ball
 from palpate.surrogates.energy_evaluator import EnergyEvaluator
 
 __all__ = ["SENSOR_VALUES", "SoftContact", "StiffStepWarning", "attach"]
@@ -420,6 +421,7 @@ def _parameters(body: Surrogate, model: Any, tool: int, name: str, parameters: S
 def _check_ball(body: Surrogate, model: Any, tool: int, name: str) -> None:
     """Refuse a tool that is no ball, or of another radius than was learnt."""
     baseline, radius = body.hand_energy.baseline, float(model.geom_size[tool, 0])
+    require_ball(baseline, "be put into a scene")
     if int(model.geom_type[tool]) != int(import_extra("mujoco", "mujoco").mjtGeom.mjGEOM_SPHERE):
         raise UsageError(
             f"The tool {name!r} is no sphere.",

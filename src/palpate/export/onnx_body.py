@@ -18,7 +18,7 @@ import numpy as np
 from palpate.export.onnx_graph import Graph, Value
 from palpate.export.onnx_network import Slopes, network_slopes, regressors
 from palpate.export.onnx_surface import distance_to
-from palpate.surrogates.baselines import Baseline
+from palpate.surrogates.baselines import Baseline, require_ball
 from palpate.surrogates.baselines.graph_form import BaselineForm, Distance, Touch, outer
 from palpate.surrogates.energy import LearntEnergy
 
@@ -36,6 +36,7 @@ def add_body(graph: Graph, energy: LearntEnergy, *, apart: bool = False) -> None
     each speaks for itself, so that it can be computed without the others.
     """
     baseline, net = energy.baseline, energy.network
+    require_ball(baseline, "be exported")
     n, D = len(energy.inputs), energy.baseline.directions
     k = len(D)
     given = graph.input("x", n)

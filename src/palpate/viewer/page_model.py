@@ -14,13 +14,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from palpate.devices.hand_kind import HandKind
-from palpate.errors import UsageError
 from palpate.format import bind_units
 from palpate.input_words import input_in_words
 from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import NodeField
+from palpate.surrogates.baselines import require_ball
 from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.units import Range, bounds
 from palpate.viewer.about_record import about_record
@@ -72,7 +72,7 @@ class PageModel:
     """
 
     def __init__(self, body: Touchable, version: int = 1, centre: np.ndarray | None = None) -> None:
-        _require_ball(body)
+        require_ball(body.energy.baseline, "be drawn on a page")
         self.body, self.version = body, version
         self.centre = body.home if centre is None else centre
         self._line = None if body.line is None else LineDrawing(body, body.line)
@@ -231,14 +231,3 @@ def vector(v: np.ndarray) -> Vec3:
 
 def _ranges(inputs: tuple[Range, ...]) -> tuple[RangeInfo, ...]:
     return tuple(RangeInfo(r.name, input_in_words(r.name), r.low, r.high, r.unit) for r in inputs)
-
-
-def _require_ball(body: Touchable) -> None:
-    """Refuse a body under another tool than a ball: the page would draw a ball at the tool's foremost point."""
-    baseline = body.energy.baseline
-    if getattr(baseline, "posed", None) is not None:
-        raise UsageError(
-            f"{body.name} is pressed by {baseline.probe_words}, which no page draws yet.",
-            why="A page draws a ball around the hand's place, and that is the tool's foremost point.",
-            fix="Ask it in Python, feel it without a page (palpate run), or learn the body under a SphereProbe.",
-        )

@@ -60,7 +60,7 @@ class PressingTool(PlainInteraction):
     depth: tuple[float, float]  # of the foremost point below the surface at rest, m
     over: tuple[Corner, Corner] | None  # box of the contact points, m
     rim: str | None
-    letter = "c"  # the inputs are c_x, c_y, c_z
+    symbol = "c"  # the inputs are c_x, c_y, c_z
 
     @property
     def stop(self) -> float | None:
@@ -118,7 +118,7 @@ class PressingTool(PlainInteraction):
         ends = [contacts + normals * (offset - d)[:, None] for d in self.depth]
         low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)
         pairs = zip("xyz", low.tolist(), high.tolist(), strict=True)
-        return tuple(Range(f"{self.letter}_{axis}", a, b, "m") for axis, a, b in pairs)
+        return tuple(Range(f"{self.symbol}_{axis}", a, b, "m") for axis, a, b in pairs)
 
     def refinements(self, geometry: Geometry) -> tuple[FineMesh, ...]:
         """Return small elements wherever it may touch."""

@@ -34,7 +34,7 @@ STOP = 0.004  # penetration in m at which a pad is fully pressed, at most
 
 @dataclass(frozen=True)
 class SurfaceTool(PressingTool):
-    """A rigid tool with a compliant skin (the pad), whose place p = (p_x, p_y, p_z) is the input.
+    """A rigid tool with a compliant skin (the pad), whose place p = (tip_x, tip_y, tip_z) is the input.
 
     The place is the tool's foremost point along its own axis, which is −z unless it is turned. The response is the
     force on the tool, -∂U/∂p in N; the torque on it about its place stands beside it in the solution. The equilibrium
@@ -77,7 +77,7 @@ class SurfaceTool(PressingTool):
     element: float | None = None
 
     rim = None
-    letter = "p"
+    symbol = "tip"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", self.posed.rotation)
@@ -120,10 +120,10 @@ class SurfaceTool(PressingTool):
 
     def offset(self, normals: np.ndarray) -> np.ndarray:
         """Return how high (N,) in m the place is above a plane of unit normals (N, 3) that the tool just touches."""
-        return self.posed.reach(normals) - normals @ self.to_centre
+        return np.asarray(self.posed.reach(normals) - normals @ self.to_centre)
 
     def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
-        """Return the ranges of p_x, p_y and p_z in m: the box around all its places."""
+        """Return the ranges of tip_x, tip_y and tip_z in m: the box around all its places."""
         self._require_room(geometry)
         return super().ranges(geometry)
 

@@ -93,7 +93,7 @@ class Contact:
     def _in_frame(self, points: np.ndarray, place: np.ndarray) -> np.ndarray:
         """Return points (N, 3) in m in the tool's own frame."""
         away = points - self._centre(place)
-        return away if self.turn is None else away @ self.turn
+        return away if self.turn is None else np.asarray(away @ self.turn)
 
     def _centre(self, place: np.ndarray) -> np.ndarray:
         return place if self.to_centre is None else place + self.to_centre

@@ -19,6 +19,7 @@ from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.pads import advise_on_pad
 from palpate.physics.interactions.rigid_limit import with_rigid_pad
 from palpate.physics.interactions.sphere import RIGID, SphereProbe
+from palpate.physics.interactions.surface_tool import SurfaceTool
 from palpate.physics.shapes.divided_surface import MOST_DRAWN, divide_large
 from palpate.physics.shapes.naming import require_known
 from palpate.physics.solid.body_symmetry import symmetry_of
@@ -93,6 +94,8 @@ class SolidProblem:
         require_no_loose_part(self.body, self.interactions)
         for interaction in self.interactions:
             advise_on_sizes(interaction, self.element, self.longest)
+            if isinstance(interaction, SurfaceTool) and self.element is not None:
+                interaction.require_resolved(self.element)
             if isinstance(interaction, SphereProbe) and interaction.pad != RIGID:
                 advise_on_pad(interaction, self.body.materials)
 

@@ -21,7 +21,7 @@ from palpate.surrogates.baselines.overlap_baseline import OverlapBaseline
 from palpate.surrogates.baselines.pad_baseline import PadBaseline
 from palpate.surrogates.baselines.rest_stiffness import RestStiffness
 from palpate.surrogates.baselines.stiffening import Stiffening
-from palpate.surrogates.baselines.tool_baseline import ToolBaseline, deepest_ball
+from palpate.surrogates.baselines.tool_baseline import ToolBaseline, deepest_ball, require_ball
 
 __all__ = [
     "Baseline",
@@ -38,4 +38,5 @@ __all__ = [
     "depth_series",
     "register_baseline",
     "registered_baselines",
+    "require_ball",
 ]

@@ -16,11 +16,11 @@ from typing import ClassVar
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.surrogates.baselines.baseline import register_baseline
+from palpate.surrogates.baselines.baseline import Baseline, register_baseline
 from palpate.surrogates.baselines.contact_baseline import ContactBaseline
 from palpate.tools import PosedTool
 
-__all__ = ["ToolBaseline", "deepest_ball"]
+__all__ = ["ToolBaseline", "deepest_ball", "require_ball"]
 
 
 def deepest_ball(tool: PosedTool, normal: np.ndarray) -> tuple[float, np.ndarray]:
@@ -80,8 +80,24 @@ class ToolBaseline(ContactBaseline):
         UsageError
             Always.
         """
-        raise UsageError(
-            f"A body under a {self.posed.shape} can't be exported yet.",
-            why="Exports and pages take the place that they get for a ball's centre; a tool's is its foremost point.",
-            fix="Ask it in Python, or learn the body under a SphereProbe.",
-        )
+        raise _needs_ball(self, "be exported")
+
+
+def require_ball(baseline: Baseline, what: str) -> None:
+    """Refuse a tool where a ball's centre is taken for the place; `what` a body under it can't do, in words.
+
+    Raises
+    ------
+    UsageError
+        For a tool.
+    """
+    if isinstance(baseline, ToolBaseline):
+        raise _needs_ball(baseline, what)
+
+
+def _needs_ball(baseline: ToolBaseline, what: str) -> UsageError:
+    return UsageError(
+        f"A body under {baseline.probe_words} can't {what} yet.",
+        why="The place would be taken for the centre of a ball, and it is the tool's foremost point.",
+        fix="Ask it in Python, feel it by `palpate run`, or learn the body under a SphereProbe.",
+    )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ngsolve import Integrate
 from trimesh import Trimesh
-from trimesh.creation import icosphere
+from trimesh.creation import box, icosphere
 
 import palpate as pp
 from palpate.errors import UsageError
@@ -75,6 +75,17 @@ def test_it_is_refused_with_an_offer_and_meshes_when_wrapped(tmp_path):
 def test_a_wrap_too_fine_for_memory_is_refused():
     with pytest.raises(UsageError, match="too fine"):
         wrap_surface(surface(*blobs()), 1e-5)
+
+
+def test_a_wrap_too_coarse_for_a_thin_body_is_refused():
+    """Refused where a cube would lose a tenth of its volume, taken where it does not."""
+    cube = box(extents=(0.004, 0.004, 0.004))
+    with pytest.raises(UsageError, match=r"too coarse for a surface 4 mm thin") as refusal:
+        wrap_surface(surface(cube.vertices, cube.faces), 0.001)
+    assert "0.5 mm" in refusal.value.fix
+    wrapped, _ = wrap_surface(surface(cube.vertices, cube.faces), 0.0005)
+    volume = Trimesh(wrapped.points, wrapped.triangles, process=False).volume
+    assert volume == pytest.approx(0.004**3, rel=1 / 12)
 
 
 def test_a_wrap_that_misses_a_part_is_refused():

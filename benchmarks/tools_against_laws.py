@@ -34,6 +34,7 @@ MODULUS = YOUNG / (1 - POISSON**2)
 FAR = 400.0  # held sides over the contact's radius
 PADS = (2.5, 10.0, 100.0)  # k a/E*, by continuation; the last two are combined
 STEP = 0.125  # element under the tool over the contact's radius
+DEPTH_STEP = 0.05  # way to a depth under the softest pad, over the contact's radius
 EDGE_STEP = 0.5  # the same at an edge over its radius
 
 A = 0.006  # m: radius of the punches
@@ -160,6 +161,8 @@ class _Section:
             decrement, energy = ngs.InnerProduct(step, residual), self.form.Energy(self.state.vec)
             if abs(decrement) < 1e-12 * abs(energy):
                 return
+            if decrement < 0:  # a negative curvature on the way: the other direction leads down
+                step.data = -1.0 * step
             before.data, length = self.state.vec, 1.0
             while length > 1e-4:
                 self.state.vec.data = before - length * step
@@ -167,7 +170,9 @@ class _Section:
                     break
                 length /= 2
             else:
-                return  # roundings: no step lowers the energy any more
+                if abs(decrement) < 1e-7 * abs(energy):
+                    return  # roundings: no step lowers the energy any more
+                raise RuntimeError("Newton's method finds no lower energy")
         raise RuntimeError("Newton's method has not converged")
 
 
@@ -207,8 +212,12 @@ def pushes(
     section = _Section(
         _mesh(contact, edge, width, height), tool, plane=plane, held=held, large=size is not None
     )
-    section.height.Set(tool.front - depth)
     answers = []
+    section.pad.Set(PADS[0] * MODULUS / contact)
+    steps = math.ceil(depth / (DEPTH_STEP * contact))
+    for i in range(1, steps + 1):
+        section.height.Set(tool.front - depth * i / steps)
+        section.equilibrate()
     for share in PADS:
         section.pad.Set(share * MODULUS / contact)
         section.equilibrate()

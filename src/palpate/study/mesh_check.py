@@ -83,12 +83,8 @@ def refine_study(
     """Return a study whose elements keep the mesh's part within half the limit, and write their size into its file.
 
     A few touches are solved on its elements and on those half as large. The error goes with the square of the size, so
-    the size follows from it; elements that are fine enough stay, and none becomes smaller than half.
-
-    Raises
-    ------
-    UsageError
-        For a study in which no ball touches.
+    the size follows from it; elements that are fine enough stay, and none becomes smaller than half. A study in which
+    no ball touches is refused.
     """
     if not isinstance(study.sweep, ProbeSweepRecord) or not isinstance(study.target, TouchTargetRecord):
         raise UsageError(

@@ -1,4 +1,4 @@
-"""What all problems share whose answers come as numbers of another program and are named by a mapping."""
+"""Problems whose answers are numbers of another program, which a mapping names: what all of them share."""
 
 from __future__ import annotations
 

@@ -113,15 +113,15 @@ def refined_state(
     judging = _judging(kept, weights, refining)
     rows = _rows(state, kept, settings, np.where(judging, 0.0, weights))
 
-    def judged(penalty: float) -> float:
+    def error_at(penalty: float) -> float:
         return _error(rows, kept, judging, weights, state.theta, project(rows, state.theta, penalty))
 
     penalty = max(refining.ridge, 1e-30)
-    before = judged(penalty * rows.total)
+    before = error_at(penalty * rows.total)
     # of the likeliest weights under noise (MacKay 1992, Neural Computation 4, 415-447): units that nearly cancel do not
     # follow noise or drift, unless what was held back shows that they are right
     noise = float(np.nan_to_num(last.expected / _WEIGHT)) ** 2 / rows.total
-    if noise > penalty and _CLEARLY * (calm := judged(noise * rows.total)) < before:
+    if noise > penalty and _CLEARLY * (calm := error_at(noise * rows.total)) < before:
         penalty, before = noise, calm
     start, damping, new = _start(state, kept, settings, refining, last)
     step = levenberg_step(rows, start, penalty * rows.total, damping=damping, tries=refining.tries)

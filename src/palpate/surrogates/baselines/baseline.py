@@ -228,6 +228,11 @@ class Baseline(ABC):
 
         `touch` is the probe at the baseline's surface where there is one, `xi` are the scaled inputs (N, n). By default
         there is none, and those exporters refuse the baseline by name.
+
+        Raises
+        ------
+        UsageError
+            Unless the baseline has such a form.
         """
         raise UsageError(
             f"The baseline {self.name!r} has no ONNX form.",

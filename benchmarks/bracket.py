@@ -109,7 +109,7 @@ def _costs(surrogate: pp.Surrogate | None, scratch: Path, quick: bool) -> Table:
     add("its memory at most", told["bytes"] / 1e9, "GB", 1.0)
     if surrogate is not None:
         page = export_html(surrogate, scratch / "bracket.html")
-        add("HTML of the bracket", page.path.stat().st_size / 1e6, "MB", 5.0)
+        add("HTML of the bracket", page.file.stat().st_size / 1e6, "MB", 5.0)
         with contextlib.suppress(ImportError):
             import fmpy  # noqa: F401  # which runs the FMU
 

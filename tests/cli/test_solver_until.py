@@ -32,6 +32,8 @@ def test_cases_are_chosen_until_the_error_is_kept_and_an_earlier_sweep_is_taken_
     assert len(pp.Dataset.open(tmp_path / "bar.zarr").ok) == said["steps"][-1]["solves"] >= 20
     model = pp.load(tmp_path / "bar.palpate")
     assert abs(model.predict([[5.0]])[0, 0] - 5.0) < 1e-2, "the heat is the power"
+    plain = palpate("sweep", path, "--samples", said["steps"][-1]["solves"], "--workers", 2)
+    assert plain.code == 0, "its unseen solves are those of a plain sweep"
     missed = palpate("sweep", path, "--until", "1e-15", "--samples", 24, "--workers", 2)
     assert missed.code == 1
     assert "The limit of 24 solves is reached. Everything is kept." in missed.err

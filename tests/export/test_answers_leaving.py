@@ -146,6 +146,7 @@ def test_its_directional_derivatives_are_those_of_the_networks(tmp_path):
     got = np.array([instance.slopes([*range(1024, 1024 + count)], [r], [1.0]) for r in (16, 17)]).T
     instance.close()
     shutil.rmtree(folder)
+    assert not any(v.name.endswith("_deviation") for v in description.modelVariables)
     wanted = np.concatenate([part.network.jacobian(middle) for part in surrogate.quantities.values()])
     scale = np.abs(wanted * (HIGH - LOW)).max(axis=1, keepdims=True)
     assert (np.abs((got - wanted) * (HIGH - LOW)) < 1e-7 * scale).all()  # central differences
@@ -286,6 +287,35 @@ def test_deviations_and_trust_leave_with_the_answers(made, tmp_path):
     model = _module(wrapper).Model()
     for x, values in zip(X[:20].tolist(), _deviations(surrogate, X[:20]), strict=True):
         np.testing.assert_allclose(model.deviation(x)[: len(values)], values, rtol=0.02)
+
+
+def test_deviations_have_the_derivatives_that_the_description_promises(tmp_path):
+    surrogate = mean_of_networks()
+    done = export_fmu(surrogate, tmp_path / "mean.fmu", check=False)
+    description, folder = fmpy.read_model_description(str(done.path)), fmpy.extract(str(done.path))
+    told = [v.valueReference for v in description.modelVariables if v.name in {"a_deviation", "b_deviation"}]
+    middle, steps = (LOW + HIGH) / 2, 1e-3 * (HIGH - LOW)
+    instance = open_instance(description, folder)
+    instance.begin()
+    instance.write([16, 17], middle.tolist())
+    got = np.array([instance.slopes(told, [r], [1.0]) for r in (16, 17)]) * steps[:, None]
+    instance.close()
+    shutil.rmtree(folder)
+    part = surrogate.quantities["mean"]
+    ends = [part.deviation(np.array([middle + d, middle - d])) for d in np.diag(steps)]
+    wanted = np.array([(after - before) / 2 for after, before in ends])
+    np.testing.assert_allclose(got, wanted, rtol=0.02, atol=0.02 * np.abs(wanted).max())
+
+
+def test_a_fit_without_a_basis_of_its_deviations_leaves():
+    """As of a fit of very many samples, whose noise alone is stated."""
+    net, c = quantities("gaussian", 0, ("a", "b")).network, np.zeros((0, 0))
+    sure = Uncertainty(net, np.array([1e-3, 2e-3]), c, c, c, np.zeros((2, 0)))
+    sure = dataclasses.replace(sure, pattern=np.zeros((2, 0), dtype=np.int64), factor=np.ones(2))
+    part = dataclasses.replace(quantities("gaussian", 0, ("a", "b")), uncertainty=sure)
+    whole = answers_of(Surrogate(meta={"name": "many"}, quantities={"many": part}))
+    X = places(5)
+    np.testing.assert_allclose(whole.doubts[0].deviation(X), part.deviation(X), rtol=1e-12)
 
 
 def test_the_deviation_of_an_extreme_is_that_of_its_place(tmp_path):

@@ -198,7 +198,9 @@ def test_a_binary_exports_all_functions_of_both_versions_and_no_others(file):
     assert len(standard["3.0"]) == 75
     own = {name for name in exported_names(content) if not name.startswith("_")}  # the linker's begin so
     assert own == set.union(*standard.values())
-    assert len(content) <= 200_000
+    assert len(content) <= 200_000 * (
+        2 if file.startswith("darwin64") else 1
+    )  # which holds two machines' code
 
 
 def test_the_universal_binary_holds_both_macs_at_their_pages():

@@ -289,7 +289,7 @@ def test_a_model_of_the_package_is_swept(spring, tmp_path):
 def test_an_outage_of_the_server_costs_nothing_where_it_is_short_else_the_case(
     returns, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(umbridge_problem, "_PAUSES", (0.3, 0.3))
+    monkeypatch.setattr(umbridge_problem, "_PAUSES", (0.3,) * (100 if returns else 2))
     models, x = served_models(answering()), np.array([3e5, 20.0])
     path = tmp_path / "served.toml"
     with serving(models) as server:

@@ -78,3 +78,10 @@ def test_a_body_that_acts_otherwise_is_refused():
     acting = {"body": {"type": "rod"}, "interactions": [{"type": "pad"}]}
     with pytest.raises(UsageError, match="under one probe, or for a problem without touch"):
         next(pp.improve(rod_problem(acting), unseen=20))
+
+
+def test_what_would_not_choose_or_not_end_in_time_is_refused(tmp_path):
+    with pytest.raises(UsageError, match="rule 'farthest' is for bodies under a probe"):
+        next(pp.improve(rod_problem(), unseen=20, rule="farthest"))
+    with pytest.raises(UsageError, match="12 solves can't be chosen one by one"):
+        next(pp.improve(rod_problem(), unseen=20, most=12, workers=1))

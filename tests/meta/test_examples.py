@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -232,7 +233,9 @@ CHECKS: dict[str, Callable[[str, Path], None]] = {
     "16_touch_in_newton.py": in_newton,
 }
 QUICK = {"04_filter_by_hand.py"}
-SLOW = pytest.mark.skip(reason="Newton compiles its kernels for minutes at the first run")
+SLOW = pytest.mark.skipif(
+    "PALPATE_NEWTON" not in os.environ, reason="Newton compiles its kernels for minutes at the first run"
+)
 MARKS = {"16_touch_in_newton.py": [pytest.mark.full, SLOW]} | {name: [] for name in QUICK}
 
 

@@ -46,3 +46,12 @@ def test_finer_solves_are_kept_beside_the_study_until_it_changes(tmp_path: Path)
     assert solve_finer(none, paths, unseen) is None
     stiffer = study.model_copy(update={"interaction": study.interaction.model_copy(update={"pad": 1e7})})
     assert load_finer(stiffer, paths) is None
+
+
+def test_elements_of_a_sweep_that_has_begun_stay(tmp_path):
+    paths = Paths(tmp_path, "block")
+    assert not paths.is_begun
+    for ending in ("", ".parts", ".batch"):  # done, cut off in a design, cut off in a chosen batch
+        (tmp_path / f"block.zarr{ending}").mkdir()
+        assert paths.is_begun
+        (tmp_path / f"block.zarr{ending}").rmdir()

@@ -96,6 +96,7 @@ def loaded_twice(rod: Surrogate) -> Surrogate:
                 scaling,
                 input_centre=np.append(scaling.input_centre, 0.0),
                 input_half=np.append(scaling.input_half, lift.high),
+                input_bend=np.append(scaling.input_bend, 0.0),
             ),
         )
 

@@ -372,6 +372,4 @@ def to_html(
     done = export_html(thing, path, check=not no_check, overwrite=force)
     if done.left_out:
         console.say(f"not in the file: {', '.join(done.left_out)} (5 MB are full, or it is on other nodes)")
-    missing = _NOT_INSTALLED.format("wasmtime", "check")
-    missing = missing if thing.can_be_touched else "the page computes its answers by itself"
-    _print(console, done, [done.file], missing, no_check=no_check)
+    _print(console, done, [done.file], _NOT_INSTALLED.format("wasmtime", "check"), no_check=no_check)

@@ -37,6 +37,7 @@ def sweep_solver_file(path: Path, options: SolverSweepOptions, console: Console)
     """Print the command of a study, run it for each case, and print where the solves are and which failed."""
     from palpate.study.solver_study import read_solver_study
     from palpate.study.solver_sweep import sweep_solver
+    from palpate.study.study_lock import hold_study
 
     study, began = read_solver_study(path), time.monotonic()
     samples = options.samples if options.improvement is None else None  # there the most solves
@@ -46,16 +47,18 @@ def sweep_solver_file(path: Path, options: SolverSweepOptions, console: Console)
     if options.improvement is not None:
         _improve(study, path.parent, options, options.improvement, console)
         return
-    solves = sweep_solver(
-        study,
-        path.parent,
-        limit=options.case_limit,
-        progress=not console.as_json,
-        scheduler=options.scheduler,
-        announce=Console().say,  # also beside --json: nobody's program starts without a word
-        log=lambda stage: console.say(f"Solving: {stage} …"),
-    )
-    paths, failures = study.paths(path.parent), solves.failures
+    paths = study.paths(path.parent)
+    with hold_study(paths, "palpate sweep"):
+        solves = sweep_solver(
+            study,
+            path.parent,
+            limit=options.case_limit,
+            progress=not console.as_json,
+            scheduler=options.scheduler,
+            announce=Console().say,  # also beside --json: nobody's program starts without a word
+            log=lambda stage: console.say(f"Solving: {stage} …"),
+        )
+    failures = solves.failures
     parts = [solves.data] if solves.unseen is None else [solves.data, solves.unseen]
     lines = [str(solves.data)] if console.verbose else []
     lines.append(f"{paths.data}: {count(len(solves.data), 'solve')} to learn from")

@@ -124,8 +124,8 @@ def refine_elements(
     from palpate.study.run import Paths
     from palpate.sweeps import local_cluster
 
-    if Paths(file.parent, study.name).data.exists():
-        console.say("Its solves are there already, and their elements stay as they are.")
+    if Paths(file.parent, study.name).is_begun:
+        console.say("Its solves are there already, or begun, and their elements stay as they are.")
         return study
     with contextlib.ExitStack() as stack:
         cluster = stack.enter_context(local_cluster(workers)) if scheduler is None else scheduler

@@ -128,9 +128,15 @@ class Dataset:
         return int(self.data.sizes["sample"])
 
     @property
+    def is_history(self) -> bool:
+        """Whether the rows are samples of histories."""
+        own = ("history", "time", "place", "dissipated")
+        return all(name in self and self.data[name].dims == ("sample",) for name in own)
+
+    @property
     def size_in_words(self) -> str:
         """The number of solves, or of histories with their samples."""
-        if "history" not in self:
+        if not self.is_history:
             return count_of(len(self), "solve")
         owners = self["history"]
         histories = count_of(len(np.unique(owners[owners >= 0])), "history", "histories")
@@ -196,7 +202,7 @@ class Dataset:
         """
         rows = np.flatnonzero(self.converged)
         # the samples of a history stay together, and a body without its memory is there to learn from
-        owners = self["history"][rows] if "history" in self else rows
+        owners = self["history"][rows] if self.is_history else rows
         parts = np.unique(owners[owners >= 0])
         if not 0 < test < 1 or parts.size < 2:
             raise UsageError(

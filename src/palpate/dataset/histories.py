@@ -118,7 +118,7 @@ def history_dataset(
 
 def is_history(data: Dataset) -> bool:
     """Return whether the rows of a dataset are samples of histories."""
-    return "history" in data
+    return data.is_history
 
 
 def histories_of(data: Dataset) -> tuple[LoadHistory, ...]:

@@ -53,6 +53,7 @@ class Doubt:
         form = forms[:, : self.plus].sum(axis=1) - forms[:, self.plus :].sum(axis=1)
         own = np.maximum(1.0 + form, 0.0)[:, None] * self.variance
         m = len(self.variance)
+        apart = apart[:, : self.members * m]  # a network has one row at least
         differences = apart.reshape(len(X), self.members, m).sum(axis=1) / max(self.members, 1)
         return own, np.stack([differences, shares @ self.missed.T], axis=1)
 

@@ -22,11 +22,13 @@ from palpate.export.answer_doubt import Doubt, doubt_of
 from palpate.format import count as count_of
 from palpate.network import Network, Scaling, TrainedRegion
 from palpate.surrogates import LearntQuantities, ModalField, Surrogate
-from palpate.units import Quantity, Range
+from palpate.units import Quantity, Range, bounds
 
 __all__ = ["MOST_DOUBTS", "AnswerNetwork", "Choice", "answer_network", "answers_of"]
 
 
+_TOLD = 100  # places at which deviations are compared before they leave
+_CLOSE = 0.05  # of a deviation: how far its form may be off
 MOST_DOUBTS = 4
 """Parts of whose deviations there is room in a block of weights."""
 
@@ -213,7 +215,7 @@ def _doubts(rows: Sequence[_Rows]) -> tuple[tuple[Doubt, ...], np.ndarray | None
             [rows[k].scatter ** 2 for k in own],
             rows[own[0]].widening,
         )
-        if doubt is None or len(made) >= MOST_DOUBTS:
+        if doubt is None or len(made) >= MOST_DOUBTS or not _is_told(doubt, part):
             return (), None
         first = 0
         for k in own:
@@ -221,6 +223,13 @@ def _doubts(rows: Sequence[_Rows]) -> tuple[tuple[Doubt, ...], np.ndarray | None
             first += len(places[k])
         made.append(doubt)
     return tuple(made), np.vstack(places)
+
+
+def _is_told(doubt: Doubt, part: LearntQuantities) -> bool:
+    """Return whether the deviations of a part survive their form, whose terms nearly cancel where units are alike."""
+    X = np.random.default_rng(0).uniform(*bounds(part.inputs), (_TOLD, len(part.inputs)))
+    own, apart = doubt.parts(X)
+    return bool(np.allclose(np.sqrt(np.maximum(own, apart[:, 0])), part.deviation(X), rtol=_CLOSE))
 
 
 def _require_fields(surrogate: Surrogate, flat: dict[str, ModalField], choice: Choice) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from palpate.errors import UsageError
+from palpate.errors import ResourceError, UsageError
 from palpate.export.check_points import ANSWERS
 from palpate.export.fmu_binaries import engine_libraries
 
@@ -38,7 +38,15 @@ class CheckEngine:
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         path = Path(self._folder.name) / f"palpate_engine{_ENDINGS[sys.platform]}"
         path.write_bytes(library)
-        self._calls: Any = ctypes.CDLL(str(path))
+        try:
+            self._calls: Any = ctypes.CDLL(str(path))
+        except OSError as error:
+            self._folder.cleanup()
+            raise ResourceError(
+                "The library for engines can't be loaded here.",
+                why=str(error),
+                fix="Set TMPDIR to a folder from which programs may run, or compare nothing: --no-check.",
+            ) from error
         self._calls.palpate_open.restype = ctypes.c_void_p
         fault = ctypes.c_int32()
         self._body = ctypes.c_void_p(self._calls.palpate_open(block, len(block), ctypes.byref(fault)))

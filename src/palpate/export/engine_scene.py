@@ -55,7 +55,9 @@ def press_ends(surrogate: Surrogate) -> tuple[np.ndarray, np.ndarray]:
     if energy.baseline.holds:
         size = np.linalg.norm(X[:, :k] * energy.inside(X)[:, None], axis=1)
         return np.zeros(3), 0.7 * X[np.argmax(size), :k] @ D
-    depth = np.where(energy.inside(X), energy.depth(X), -np.inf)
+    depth, inside = energy.depth(X), energy.inside(X)
+    if inside.any():
+        depth = np.where(inside, depth, -np.inf)
     row = np.argsort(depth)[-max(1, int(np.isfinite(depth).sum()) // 20)]
     evaluate = energy.evaluator()
     evaluate(X[row, :3], middle[3:])

@@ -42,7 +42,7 @@ _SOURCES = (
     "fmi3.c",
 )
 _PROGRAMS = {"palpate_fmu": _SOURCES, "palpate_engine": ("field.c", "engine.c")}
-# small code for macOS: both machines' parts stand in one file of FMI 2.0, which is to be less than 200 kB
+# small code for macOS: both machines' parts, less than 200 kB each, stand in one file of FMI 2.0
 # little is inlined there, and nothing unwinds; the head has room for a signature, and not a page of it
 _SMALL = (
     "-Os",

@@ -11,7 +11,7 @@ import json
 import os
 import struct
 from collections.abc import Mapping
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from palpate.export.fmu_binaries import engine_libraries, require_generic
 from palpate.export.package_folder import ExportedPackage, write_package
 from palpate.export.weights_block import WeightsBlock, identifier
 from palpate.surrogates import FieldSurrogate, Surrogate
-from palpate.surrogates.model_card import card_of
+from palpate.surrogates.model_card import NOT_STATED, card_of
 
 __all__ = ["export_unity"]
 
@@ -147,6 +147,7 @@ def _json(value: Mapping[str, object]) -> bytes:
 def _manifest(surrogate: Surrogate, name: str, space: str) -> dict[str, object]:
     from palpate.version import __version__
 
+    licence = card_of(surrogate).licence
     package = "".join(c for c in name.lower() if c.isalnum() or c == "-")
     return {
         "name": f"org.palpate.{package}",
@@ -155,7 +156,7 @@ def _manifest(surrogate: Surrogate, name: str, space: str) -> dict[str, object]:
         "description": "A body learnt from finite-element solves, with force and deformed shape. Tried with Mono and "
         "stand-ins for Unity's types, not in the Unity editor.",
         "unity": "2021.3",
-        "license": "MIT",
+        **({} if licence == NOT_STATED else {"license": licence}),  # of the body; the library's own is MIT
         "samples": [
             {
                 "displayName": "Press",
@@ -175,7 +176,7 @@ def _mesh_bytes(mesh: FieldSurrogate) -> bytes:
 
 def _with_folders(files: Mapping[str, bytes]) -> list[str]:
     """Return the names of files and folders that Unity gives meta files: all but those of folders that end in ~."""
-    names = set(files) | {str(parent) for path in files for parent in Path(path).parents}
+    names = set(files) | {str(parent) for path in files for parent in PurePosixPath(path).parents}
     return sorted(name for name in names if name != "." and "~" not in name)
 
 

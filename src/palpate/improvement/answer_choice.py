@@ -19,9 +19,6 @@ from palpate.units import Range
 __all__ = ["CANDIDATES", "choose_answers"]
 
 CANDIDATES = 400  # places among which a batch is chosen
-_BORDER = (
-    1.15  # times the ranges: candidates beyond them are moved to their ends, where answers are extrapolated
-)
 _CALM = 4.0  # solves whose misses are as expected, added to those beside a place: few say little
 _MOST = 10.0  # times the mean that a place may count
 

@@ -119,6 +119,12 @@ def improve(
         If more than half of the first solves fail.
     """
     is_pressed = _is_pressed(problem)
+    if not is_pressed and options.rule not in {"variance", "sobol"}:
+        raise UsageError(
+            f"The rule {options.rule!r} is for bodies under a probe.",
+            why="It asks for the force that a hand feels.",
+            fix='Use rule="variance" or rule="sobol".',
+        )
     if isinstance(unseen, int | np.integer):
         checks.fits("The number of unseen solves", unseen, least=1, whole=True)
         unseen = (

@@ -87,11 +87,18 @@ class AnswerImprovement:
         """Solve the first places, where they are not solved yet; return whether any were."""
         space, solved = Space(self.problem.ranges), len(self.kept)
         first = max(FEWEST, _EACH * len(space))
+        if self.stop.most < first and len(self.kept) < first:
+            raise UsageError(
+                f"{count(self.stop.most, 'solve')} can't be chosen one by one.",
+                why=f"The first {first} only begin.",
+                fix=f"Ask for {first} solves or more, or for a sweep of a design.",
+            )
         wanted = first
         for _ in range(_TRIES):
             good = 0 if self.kept.good is None else len(self.kept.good)
             if good >= FEWEST and len(self.kept) >= first:
                 break
+            wanted = min(wanted, self.stop.most)
             points = sobol(space, wanted, self.options.seed)[len(self.kept) :]
             self.log(f"the first {count(len(points), 'solve')}")
             if len(points):

@@ -36,10 +36,10 @@ __all__ = ["Evaluator", "Network", "Scaling"]
 
 @dataclass(frozen=True, eq=False)
 class Scaling:
-    """Affine maps between physical and scaled quantities.
+    """Maps between physical and scaled quantities: affine for outputs, and for inputs without a bend.
 
     Inputs: ξ = (x − c)/(h + b (x − c)) with centre c, half width h and bend b, in [−1, 1] over the declared ranges.
-    Without a bend this is affine. With the bend of `log_bends` equal ratios of x are about equal steps of ξ; unlike a
+    Without a bend this is affine. With the bend of `log_bend` equal ratios of x are about equal steps of ξ; unlike a
     logarithm it is exact arithmetic on every machine. Outputs: y = output_centre + output_scale · η, one scale for a
     whole group of outputs so that their errors compare.
 

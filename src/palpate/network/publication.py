@@ -35,7 +35,7 @@ from palpate.units import Quantity, Range
 
 __all__ = ["Publisher", "Subscriber"]
 
-_MAGIC = b"palpate network 1\n".ljust(32, b"\0")
+_MAGIC = b"palpate network 2\n".ljust(32, b"\0")
 _LATEST, _LENGTH, _TEXT = 32, 40, 64  # places of the newest serial number, the text's length and the text
 _HEAD = 8  # serial, h, r, k, whether there is a basis, radial function; two to spare
 

@@ -113,7 +113,7 @@ def work_on(
         return
     fewer = workers or max(1, available_cores() - 1)
     with local_cluster(fewer) as cluster:
-        if refine is not None and not paths.data.exists():
+        if refine is not None and not paths.is_begun:
             study = refine_study(
                 study, refine, cluster=cluster, progress=False, log=lambda w: say({"log": w})
             )

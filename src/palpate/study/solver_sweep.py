@@ -17,11 +17,10 @@ from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.format import count
 from palpate.improvement import ImprovementStep, improve
-from palpate.improvement.improve_answers import unseen_places
 from palpate.learning.learn_dataset import learn
 from palpate.options import ImprovementOptions
 from palpate.study.solver_study import SolverStudy
-from palpate.sweeps import OnDemandCluster, Scheduler, grow, sweep
+from palpate.sweeps import OnDemandCluster, Scheduler, Space, grow, random, sweep
 from palpate.sweeps.command_problem import READING
 
 __all__ = ["SolverSolves", "improve_solver", "sweep_solver"]
@@ -106,7 +105,7 @@ def improve_solver(
     with _machines(study, scheduler) as cluster:
         for step in improve(
             problem,
-            unseen=unseen_places(problem, number, study.test.seed),
+            unseen=random(Space(problem.ranges), number, study.test.seed),  # those of `sweep_solver`
             path=paths.data,
             unseen_path=paths.random,
             learner=lambda data, _: learn(data, name=study.name, workers=1),

@@ -26,6 +26,12 @@ class Paths:
         return self.folder / f"{self.name}.zarr"
 
     @property
+    def is_begun(self) -> bool:
+        """Whether solves are there, or a sweep or a batch of them has begun."""
+        names = (self.data.name + ending for ending in ("", ".parts", ".batch"))
+        return any(self.data.with_name(name).exists() for name in names)
+
+    @property
     def random(self) -> Path:
         """Dataset of further solves, for testing only."""
         return self.folder / f"{self.name}-random.zarr"

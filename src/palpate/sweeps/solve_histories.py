@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from palpate import checks
 from palpate.dataset import Dataset
 from palpate.dataset.histories import LoadHistory, history_dataset
 from palpate.errors import UsageError
@@ -72,6 +73,9 @@ def solve_histories(
         If the problem has not one load, or the first load of a history or the elastic body can't be solved.
     """
     _require_one_load(problem)
+    checks.fits("The number of histories", count, least=1, whole=True)
+    checks.positive("The length of a history", span, "s")
+    checks.positive("The step of a history", step, "s")
     load, rng, paths, began = problem.ranges[0], np.random.default_rng(seed), [], time.perf_counter()
     low, high, largest = load.low, load.high, max(-load.low, load.high)
     for i in range(count):

@@ -145,7 +145,7 @@ class Cylinder(Tool):
 
     def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and y of the cut at a depth in m."""
-        depth = min(depth, self.radius)
+        depth = min(max(depth, 0.0), self.radius)
         across = math.sqrt(depth * (2 * self.radius - depth))
         return self.length / 2 - self.edge + _round_edge(self.edge, depth), across
 
@@ -242,5 +242,5 @@ def _require_edge(what: str, edge: float, most: float) -> None:
         raise UsageError(
             f"The edge radius of a {what} is {millimetres(edge)}.",
             why=f"The {what} has room for {millimetres(most)}.",
-            fix=f"Give an edge of at most {most:.3g} (m).",
+            fix=f"Give an edge of at most {0.995 * most:.3g} (m).",
         )

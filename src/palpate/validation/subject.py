@@ -112,6 +112,12 @@ def _by_answers(model: Surrogate, test: Dataset) -> Subject:
             f"{model.name} takes {', '.join(n for n, _ in own)}.",
             fix="Test with solves of the same inputs, in the same order and units.",
         )
+    if not len(good):
+        raise UsageError(
+            "There is no converged solve to test with.",
+            why=f"None of {count(len(test), 'solve')} converged.",
+            fix="Look at the reasons that the rows give, and sweep others.",
+        )
     seen = np.zeros(len(good), dtype=bool)
     parts: list[LearntQuantities | Field] = [*model.quantities.values(), *model.fields.values()]
     for part in parts:

@@ -54,8 +54,9 @@ def compare_page(surrogate: Surrogate, parts: Mapping[str, str]) -> Comparison:
     for own, facts in zip(surrogate.quantities.values(), page["groups"], strict=True):
         name = ", ".join(q.name for q in own.outputs)
         found |= dict(_numbers(name, own, _group(facts, inputs, read), X))
+    shown_by_name = {shown.name: shown for shown in surrogate.modal_fields.values()}
     for facts in (*page["curves"], *page["fields"]):
-        shown = surrogate.modal_fields[facts["name"]]
+        shown = shown_by_name[facts["name"]]
         coefficients = _group(facts["coefficients"], inputs, read)
         found |= dict(_numbers(f"{shown.name}, coefficients", shown.coefficients, coefficients, X))
         found[shown.name] = _field(shown, facts, coefficients, read, X)

@@ -81,7 +81,7 @@ static int directional(Instance *c, const uint32_t *unknown, size_t unknowns, co
     if (!is_input(c, known[j])) return refuse(c, "There is no input, parameter or state of this reference to derive by.");
   }
   for (i = 0; i < unknowns; i++) {
-    const int is_output = c->untouched ? answer_of(c, unknown[i]) >= 0 : unknown[i] >= FX && unknown[i] <= (c->size ? LOST : DEVIATION) && unknown[i] != SCALE;
+    const int is_output = c->untouched ? answer_of(c, unknown[i]) >= 0 || deviation_of(c, unknown[i]) >= 0 : unknown[i] >= FX && unknown[i] <= (c->size ? LOST : DEVIATION) && unknown[i] != SCALE;
     if (!is_output && !(c->exchange && rate_of(c, unknown[i]) >= 0)) {
       return refuse(c, "Only real outputs, and rates in model exchange, have directional derivatives.");
     }

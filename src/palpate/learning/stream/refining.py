@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, get_args
 
@@ -120,7 +121,8 @@ def refined_state(
     before = error_at(penalty * rows.total)
     # of the likeliest weights under noise (MacKay 1992, Neural Computation 4, 415-447): units that nearly cancel do not
     # follow noise or drift, unless what was held back shows that they are right
-    noise = float(np.nan_to_num(last.expected / _WEIGHT)) ** 2 / rows.total
+    expected = last.expected if math.isfinite(last.expected) else 0.0
+    noise = (expected / _WEIGHT) ** 2 / rows.total
     if noise > penalty and _CLEARLY * (calm := error_at(noise * rows.total)) < before:
         penalty, before = noise, calm
     start, damping, new = _start(state, kept, settings, refining, last)

@@ -142,8 +142,8 @@ class SurfaceTool(PressingTool):
             f"The edge of the {self.shape} is too sharp for elements of {millimetres(element)}.",
             why=f"Its least radius is {millimetres(edge)}, and an element may be twice as long at most: coarser ones "
             "do not see the edge.",
-            fix=f"Give an edge of at least {element / EDGE_ELEMENT:.2g} (m), or element={EDGE_ELEMENT * edge:.2g} (m) "
-            "and more time.",
+            fix=f"Give an edge of at least {1.05 * element / EDGE_ELEMENT:.2g} (m), or "
+            f"element={0.95 * EDGE_ELEMENT * edge:.2g} (m) and more time.",
         )
 
     def contact_radius(self, depth: float) -> float:
@@ -188,7 +188,8 @@ class SurfaceTool(PressingTool):
             f"The {self.shape} is larger than the surface {self.touches!r}.",
             why=f"At {millimetres(max(self.depth))} it cuts {millimetres(needed)} wide, and the surface has "
             f"{millimetres(room)}.",
-            fix=f"Take a tool of at most half that width, {room / 2:.2g} (m); lengths are in m: pass 0.005 for 5 mm.",
+            fix=f"Take a tool of at most half that width, {0.95 * room / 2:.2g} (m); lengths are in m: pass 0.005 for "
+            "5 mm.",
         )
 
     def attach_pad(self, field: Field, pad: Any) -> Attached:

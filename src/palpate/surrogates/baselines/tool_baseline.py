@@ -59,6 +59,16 @@ class ToolBaseline(ContactBaseline):
 
     tool: str = ""
 
+    def __post_init__(self) -> None:
+        try:
+            _ = self.posed
+        except (ValueError, KeyError, TypeError) as error:
+            raise UsageError(
+                "The baseline of a tool tells of no tool.",
+                why=str(error),
+                fix="Let `palpate.learn` make it, or copy the file again.",
+            ) from error
+
     def __str__(self) -> str:
         return f"{self.posed}; {self.law}"
 

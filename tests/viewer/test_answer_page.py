@@ -18,6 +18,7 @@ from palpate.surrogates import LearntQuantities, MeshPlaces, ModalField, Surroga
 from palpate.viewer import answer_page
 from palpate.viewer.answer_viewer import AnswerViewer
 from palpate.viewer.file_page import export_html
+from waiting import wait_for
 
 PHONE = {"width": 390, "height": 844}
 WIDE = {"width": 1440, "height": 900}
@@ -240,8 +241,7 @@ def test_the_nearest_solve_is_drawn_beside_with_its_own_values(browser: Browser,
     button.click()
     assert button.get_attribute("aria-pressed") == "true"
     assert "right: the nearest solve" in page.locator("#scale-notes").text_content()
-    page.wait_for_timeout(300)  # two pictures
-    assert page.locator("#view").screenshot() != before
+    wait_for(lambda: page.locator("#view").screenshot() != before)
     button.click()
     assert "nearest solve" not in page.locator("#scale-notes").text_content()
     assert_no(complaints)

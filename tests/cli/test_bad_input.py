@@ -236,7 +236,6 @@ def files(tmp_path_factory):
     ("command", "words"),
     [
         ("learn none.zarr", ["does not exist", "palpate sweep"]),
-        ("view net.palpate", ["holds a network of data", "a learnt body is needed", "palpate ask"]),
         ("run net.palpate", ["holds a network of data", "palpate ask"]),
         ("export gltf net.palpate -o net.glb", ["holds a network of data"]),
         ("ask t.csv", ["is not a .palpate file: it is a file of data", "palpate fit"]),

@@ -165,7 +165,7 @@ def test_solves_that_fail_stay_out(cluster):
 def test_another_bodys_solves_are_refused(improve, tmp_path):
     path = tmp_path / "slab.zarr"
     next(iter(improve(path=path)))
-    with pytest.raises(UsageError, match="not of this body"):
+    with pytest.raises(UsageError, match="of another problem"):
         next(iter(pp.improve(PressedSlab(failing=0.1), path=path, progress=False)))
 
 

@@ -41,7 +41,7 @@ def test_a_rigid_ball_feels_the_force_of_hard_contact_in_calculix(ccx, tmp_path)
     solver = Body(Block((0.10, 0.10, 0.05)), gel, fixed="bottom").problem(probe).open()
     found = [solver.solve((0.05, 0.05, 0.05 + RADIUS - depth)) for depth in DEPTHS]
     text = calculix_ball.deck(
-        calculix.neo_hookean(gel), YOUNG, (0.10, 0.05), RADIUS, list(DEPTHS), fine=0.002
+        calculix.neo_hookean(gel), YOUNG, (0.10, 0.05), RADIUS, list(DEPTHS), fine=0.003
     )
     wanted = calculix_ball.forces(calculix.output(ccx, tmp_path, text))
     np.testing.assert_allclose([solution.response[2] for solution in found], wanted, rtol=0.02)

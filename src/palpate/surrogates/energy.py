@@ -143,7 +143,7 @@ class LearntEnergy:
         if self.region is None:
             return X
         scaling = self.network.scaling
-        return np.vstack([X, scaling.input_centre + scaling.input_half * self.region.points])
+        return np.vstack([X, scaling.unscale_inputs(self.region.points)])
 
     @cached_property
     def _constants(self) -> tuple[Any, ...]:

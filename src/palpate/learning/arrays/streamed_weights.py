@@ -71,7 +71,7 @@ class RegressorRows:
         self._numbers = np.ascontiguousarray(
             np.vstack([factors[:, entries[:, 0], entries[:, 1]].T, shifts.T]), dtype=np.float64
         )
-        self._scales = np.vstack([np.zeros(n), np.ones(n)])
+        self._scales = np.vstack([np.zeros(n), np.ones(n), np.zeros(n)])  # inputs are scaled already
         self.columns = self.tail + self.units
         self._lines = HEAD + shifts.shape[1] + 2 * (1 + n)
 

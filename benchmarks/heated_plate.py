@@ -92,7 +92,9 @@ def tables(*, quick: bool = False) -> list[Table]:
     ]
     own = [row["p95"] for row in rows if row["by"] == "palpate"]
     claims = [Claim("error at the 95th percentile from 60 solves", (own[-1],), WANTED, ".2e")]
-    title = f"A heated plate with a hole, {len(points):,} nodes, {len(asked)} unseen solves{quick_mark(quick)}"
+    title = (
+        f"A heated plate with a hole, {len(points):,} nodes, {len(asked)} unseen solves{quick_mark(quick)}"
+    )
     notes = () if quick else missing_note()
     return [Table("heated_plate", title, COLUMNS, rows, [] if quick else claims, notes)]
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from palpate.format import (
     bind_units,
+    bound,
     count,
     criterion_figure,
     duration,
@@ -127,3 +128,16 @@ def test_json_in_a_script_is_the_same_value_without_marks(value):
     text = script_json(json.dumps(value, ensure_ascii=False))
     assert json.loads(text) == value
     assert not set("<>&\u2028\u2029") & set(text)
+
+
+@given(st.floats(1e-9, 1e9), st.integers(1, 5))
+def test_a_bound_keeps_to_its_side_and_near(value, digits):
+    most, least = bound(value, digits), bound(value, digits, least=True)
+    assert most <= value * (1 + 1e-8)
+    assert least >= value * (1 - 1e-8)
+    assert least - most <= 1.1 * 10.0 ** (1 - digits) * value
+
+
+def test_a_bound_that_has_few_digits_stays():
+    assert [bound(v) for v in (0.0005, 0.02, 1.5, 1.544)] == [0.0005, 0.02, 1.5, 1.5]
+    assert [bound(v, least=True) for v in (0.0015, 1.544)] == [0.0015, 1.6]

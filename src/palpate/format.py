@@ -10,6 +10,7 @@ from palpate.units import Range
 
 __all__ = [
     "bind_units",
+    "bound",
     "by_number",
     "count",
     "criterion_figure",
@@ -169,6 +170,16 @@ def with_interval(value: float, low: float, high: float) -> str:
 def _order(size: float) -> int:
     """Return the power of ten of the first digit of a positive number."""
     return math.floor(math.log10(size))
+
+
+def bound(value: float, digits: int = 2, *, least: bool = False) -> float:
+    """Return a positive number rounded down to some digits, so that it may be told as a most, or up as a least."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    steps = value / unit
+    whole = round(steps)
+    if abs(steps - whole) > 1e-9 * steps:
+        whole = math.ceil(steps) if least else math.floor(steps)
+    return float(f"{whole * unit:.{digits + 2}g}")
 
 
 def millimetres(*lengths: float) -> str:

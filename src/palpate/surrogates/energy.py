@@ -95,8 +95,12 @@ class LearntEnergy:
     def _fault(self) -> str:
         """Return what does not fit; "" if all does."""
         n, m = len(self.network.inputs), len(self.network.outputs)
-        if m != 1:
-            return f"its network has {m} outputs, not one"
+        if m != 1 or self.network.scaling.is_bent:
+            return (
+                f"its network has {m} outputs, not one"
+                if m != 1
+                else "its network's inputs are on bent scales"
+            )
         if fault := self.baseline.fault(self.network.inputs):
             return fault
         if self.region is not None and self.region.points.shape[1] != n:

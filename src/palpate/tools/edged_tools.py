@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
-from palpate.format import millimetres
+from palpate.format import bound, millimetres
 from palpate.tools.tool_shape import Tool, absolute, larger, length, parts, positive, where_positive
 
 __all__ = ["Box", "Cylinder", "Punch"]
@@ -242,5 +242,5 @@ def _require_edge(what: str, edge: float, most: float) -> None:
         raise UsageError(
             f"The edge radius of a {what} is {millimetres(edge)}.",
             why=f"The {what} has room for {millimetres(most)}.",
-            fix=f"Give an edge of at most {0.995 * most:.3g} (m).",
+            fix=f"Give an edge of at most {bound(most, 3):g} (m).",
         )

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import UsageError
-from palpate.format import millimetres, number
+from palpate.format import bound, millimetres, number
 from palpate.physics.interactions.interaction import Attached, Field
 from palpate.physics.interactions.interaction_checks import range_of
 from palpate.physics.interactions.pressing import Corner, PressingTool, checked_box
@@ -142,8 +142,8 @@ class SurfaceTool(PressingTool):
             f"The edge of the {self.shape} is too sharp for elements of {millimetres(element)}.",
             why=f"Its least radius is {millimetres(edge)}, and an element may be twice as long at most: coarser ones "
             "do not see the edge.",
-            fix=f"Give an edge of at least {1.05 * element / EDGE_ELEMENT:.2g} (m), or "
-            f"element={0.95 * EDGE_ELEMENT * edge:.2g} (m) and more time.",
+            fix=f"Give an edge of at least {bound(element / EDGE_ELEMENT, least=True):g} (m), or "
+            f"element={bound(EDGE_ELEMENT * edge):g} (m) and more time.",
         )
 
     def contact_radius(self, depth: float) -> float:
@@ -188,7 +188,7 @@ class SurfaceTool(PressingTool):
             f"The {self.shape} is larger than the surface {self.touches!r}.",
             why=f"At {millimetres(max(self.depth))} it cuts {millimetres(needed)} wide, and the surface has "
             f"{millimetres(room)}.",
-            fix=f"Take a tool of at most half that width, {0.95 * room / 2:.2g} (m); lengths are in m: pass 0.005 for "
+            fix=f"Take a tool of at most half that width, {bound(room / 2):g} (m); lengths are in m: pass 0.005 for "
             "5 mm.",
         )
 

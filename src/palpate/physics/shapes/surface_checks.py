@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.format import bound
 from palpate.physics.shapes.surface_repair import place
 from palpate.physics.shapes.surface_wrap import COARSEST
 
@@ -102,7 +103,7 @@ def _require_apart(surface: Trimesh, source: str) -> None:
 def _mended_by_wrap(surface: Trimesh, what: str, why: str, fix: str) -> UsageError:
     """Return the refusal of a surface that may be wrapped: by a fortieth of its length, an eighth of its thickness."""
     extents = 1e3 * surface.extents[surface.extents > 0]  # mm
-    size = min(float(f"{extents.max() / WRAPPED:.1g}"), float(f"{0.95 * extents.min() / COARSEST:.2g}"))
+    size = min(float(f"{extents.max() / WRAPPED:.1g}"), bound(extents.min() / COARSEST))
     ways = (
         f"`palpate touch` with --wrap {size:g}mm, wrap = '{size:g} mm' in a study's [body], or "
         f"ImportedSolid(…, wrap={1e-3 * size:g})"

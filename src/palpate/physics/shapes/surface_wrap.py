@@ -20,7 +20,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from palpate.errors import UsageError
-from palpate.format import millimetres
+from palpate.format import bound, millimetres
 from palpate.physics.shapes.meshing import split_triangles
 from palpate.physics.shapes.surface_repair import SAME, Surface, unite_points
 
@@ -60,7 +60,7 @@ def wrap_surface(surface: Surface, size: float) -> tuple[Surface, Moved]:
         raise UsageError(
             f"A wrap of {millimetres(size)} is too coarse for a surface {millimetres(thinnest)} thin.",
             why="Edges are rounded by about a third of the wrap: a cube loses 7 % of its volume at that limit.",
-            fix=f"Wrap by {millimetres(0.99 * thinnest / COARSEST)} or less.",
+            fix=f"Wrap by {millimetres(bound(thinnest / COARSEST))} or less.",
         )
     h = size / 2
     node = unite_points(surface.points, SAME * surface.length)  # some formats have no shared corners

@@ -129,7 +129,7 @@ class Dataset:
 
     @property
     def is_history(self) -> bool:
-        """Whether the rows are samples of histories."""
+        """True where the rows are samples of histories."""
         own = ("history", "time", "place", "dissipated")
         return all(name in self and self.data[name].dims == ("sample",) for name in own)
 

@@ -215,7 +215,7 @@ def _doubts(rows: Sequence[_Rows]) -> tuple[tuple[Doubt, ...], np.ndarray | None
             [rows[k].scatter ** 2 for k in own],
             rows[own[0]].widening,
         )
-        if doubt is None or len(made) >= MOST_DOUBTS or not _is_told(doubt, part):
+        if doubt is None or len(made) >= MOST_DOUBTS or not _has_form(doubt, part):
             return (), None
         first = 0
         for k in own:
@@ -225,7 +225,7 @@ def _doubts(rows: Sequence[_Rows]) -> tuple[tuple[Doubt, ...], np.ndarray | None
     return tuple(made), np.vstack(places)
 
 
-def _is_told(doubt: Doubt, part: LearntQuantities) -> bool:
+def _has_form(doubt: Doubt, part: LearntQuantities) -> bool:
     """Return whether the deviations of a part survive their form, whose terms nearly cancel where units are alike."""
     X = np.random.default_rng(0).uniform(*bounds(part.inputs), (_TOLD, len(part.inputs)))
     own, apart = doubt.parts(X)

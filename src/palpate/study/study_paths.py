@@ -27,7 +27,7 @@ class Paths:
 
     @property
     def is_begun(self) -> bool:
-        """Whether solves are there, or a sweep or a batch of them has begun."""
+        """True where solves are there, or a sweep or a batch of them has begun."""
         names = (self.data.name + ending for ending in ("", ".parts", ".batch"))
         return any(self.data.with_name(name).exists() for name in names)
 

@@ -56,7 +56,7 @@ def test_its_file_answers_the_same_and_names_the_tool(ball, tmp_path):
     again = pp.load(ball.save(tmp_path / "ball.palpate"))
     X = pressed.places(20) - WAY
     np.testing.assert_array_equal(again.energy.force(X), ball.energy.force(X))
-    assert again.energy.baseline.posed == PosedTool(Sphere(RADIUS))
+    assert again.energy.baseline.posed_tool == PosedTool(Sphere(RADIUS))
     assert "sphere of radius 10 mm" in str(again)
 
 

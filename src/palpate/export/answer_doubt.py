@@ -130,7 +130,7 @@ def _network(part: LearntQuantities, rows: np.ndarray) -> Network:
         more = np.zeros((len(rows), member.units))
         more[some] = own[:, 1 + n :]
         rows = np.hstack([rows, more])
-    factors, shifts = _stacked([net, *part.members])
+    factors, shifts = _stack_units([net, *part.members])
     rows = rows if len(rows) else np.zeros((1, 1 + n + len(factors)))
     zero, one, outer = np.zeros(len(rows)), np.ones(len(rows)), net.scaling
     return Network(
@@ -162,7 +162,7 @@ def _same_units(one: Network, other: Network) -> bool:
     )
 
 
-def _stacked(networks: Sequence[Network]) -> tuple[np.ndarray, np.ndarray]:
+def _stack_units(networks: Sequence[Network]) -> tuple[np.ndarray, np.ndarray]:
     """Return factors (h, r, n) and shifts (h, r) of several networks, one after the other."""
     r = max(net.factors.shape[1] for net in networks)
     gaps = [(net, (0, r - net.factors.shape[1])) for net in networks]

@@ -76,7 +76,7 @@ def export_onnx(
         block = WeightsBlock.of(replace(surrogate, fields={}))
         add_body(graph, surrogate.hand_energy)
     model = graph.model(surrogate.name, _metadata(surrogate, block))
-    comparison = _compared(surrogate, model, Precision(single, tolerance)) if check else None
+    comparison = _compare(surrogate, model, Precision(single, tolerance)) if check else None
     if comparison is not None:
         fix = "Export it in double precision." if single else "Report this with the model file."
         comparison.require(
@@ -109,7 +109,7 @@ def _metadata(surrogate: Surrogate, block: WeightsBlock) -> dict[str, str]:
     return plain | {"outputs": json.dumps(units), "about": about, "name": surrogate.name}
 
 
-def _compared(surrogate: Surrogate, model: Any, precision: Precision) -> Comparison | None:
+def _compare(surrogate: Surrogate, model: Any, precision: Precision) -> Comparison | None:
     try:
         import onnxruntime  # type: ignore[import-untyped,unused-ignore]
     except ImportError:

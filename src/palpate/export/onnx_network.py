@@ -109,7 +109,7 @@ def regressors(graph: Graph, network: Network, xi: Value, felt: int) -> tuple[Va
     return graph.join(one, xi, units.phi), (graph.join(*lines) if felt > 1 else lines[0])
 
 
-def _scaled(graph: Graph, scaling: Scaling, X: Value) -> tuple[Any, Value | None]:
+def _scale_inputs(graph: Graph, scaling: Scaling, X: Value) -> tuple[Any, Value | None]:
     """Return scaled inputs (N, n), and what bends multiply their derivatives by h (N, n); None without bends."""
     far: Any = X - scaling.input_centre
     h, b = scaling.input_half, scaling.input_bend
@@ -133,7 +133,7 @@ def add_network(graph: Graph, *networks: Network) -> None:
     slopes: Any = None
     for network in networks:
         rows = _rows(network)
-        xi, turn = _scaled(graph, network.scaling, X)
+        xi, turn = _scale_inputs(graph, network.scaling, X)
         row, lines = regressors(graph, network, xi, n)
         value, slope = row @ rows, (lines @ rows).swap()
         if turn is not None:

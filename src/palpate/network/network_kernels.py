@@ -191,7 +191,7 @@ def _denominator(far, i, scales) -> float:
 
 
 @part
-def _scaled(x, i, scales) -> float:
+def _scale_input(x, i, scales) -> float:
     """ξ of input i at x."""
     far = x - scales[0, i]
     return float(far / _denominator(far, i, scales))
@@ -213,7 +213,7 @@ def _regress(x, line, work, steps, layout, scales, units, constants, order) -> N
     n, h, count = x.size, units.shape[1], layout.shape[0] - 1
     work[line, 0] = 1.0
     for i in range(n):
-        work[line, 1 + i] = _scaled(x[i], i, scales)
+        work[line, 1 + i] = _scale_input(x[i], i, scales)
     for k in range(h):
         work[Q, k] = 0.0
     e = 0

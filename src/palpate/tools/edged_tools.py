@@ -139,7 +139,7 @@ class Cylinder(Tool):
         return self.radius
 
     @property
-    def inscribed(self) -> float:
+    def inscribed_radius(self) -> float:
         """The radius in m, or half the length where that is less."""
         return min(self.radius, self.length / 2)
 
@@ -214,7 +214,7 @@ class Box(Tool):
         return min(self.size_x, self.size_y) / 2
 
     @property
-    def inscribed(self) -> float:
+    def inscribed_radius(self) -> float:
         """Half the shortest side in m."""
         return min(self._halves)
 

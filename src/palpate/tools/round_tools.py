@@ -197,7 +197,7 @@ class Fingertip(Tool):
         return min(self._axes)
 
     @property
-    def inscribed(self) -> float:
+    def inscribed_radius(self) -> float:
         """Half the shortest length in m."""
         return min(self._axes)
 

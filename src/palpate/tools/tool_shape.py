@@ -102,7 +102,7 @@ class Tool:
         raise NotImplementedError
 
     @property
-    def inscribed(self) -> float:
+    def inscribed_radius(self) -> float:
         """Radius in m of a ball around the centre that is all within the tool."""
         return self.front
 

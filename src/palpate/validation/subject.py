@@ -222,7 +222,7 @@ def _refuse_radius(energy: LearntEnergy | None, data: Dataset | None) -> None:
         return
     own = energy.baseline.radius
     acting = data.provenance.get("problem", {}).get("interactions", [])
-    tool = getattr(energy.baseline, "posed", None)
+    tool = getattr(energy.baseline, "posed_tool", None)
     tools = [PosedTool.of(a) for a in acting if isinstance(a, dict) and a.get("type") == "SurfaceTool"]
     if any(one != tool for one in tools) or (tool is not None and not tools):
         raise UsageError(

@@ -90,7 +90,7 @@ def recognise_histories(data: Dataset, request: Request) -> Recognised | None:
     own, further = request.split("mirrors", "relaxes")
     relaxes = bool(own.get("relaxes", data.provenance.get("relaxes", False)))
     mirrors, paths = bool(own.get("mirrors", True)), histories_of(data)
-    elastic = _checked(paths, elastic_of(data), mirrors)
+    elastic = _require_elastic(paths, elastic_of(data), mirrors)
     baseline, solves, kept = _energy(data, paths, elastic, mirrors)
     with threadpool_limits(1):
         shape, shape_error = _shape(data, paths, mirrors, request.search.seed)
@@ -124,7 +124,7 @@ def _memory(
     return elements, MemoryFit(error, len(elements), len(candidates), miss, shape_error)
 
 
-def _checked(paths: Paths, elastic: LoadHistory | None, mirrors: bool) -> LoadHistory:
+def _require_elastic(paths: Paths, elastic: LoadHistory | None, mirrors: bool) -> LoadHistory:
     """Return the history of the elastic body; an error where it does not reach as far as the others."""
     if not paths or elastic is None or len(elastic) < FEWEST:
         known = 0 if elastic is None else len(elastic)

@@ -80,7 +80,7 @@ class SurfaceTool(PressingTool):
     symbol = "tip"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", self.posed.rotation)
+        object.__setattr__(self, "rotation", self.posed_tool.rotation)
         if self.pad != RIGID:
             require_pad(self.pad)
         object.__setattr__(self, "depth", range_of("The depth of a tool", self.depth, "m"))
@@ -88,15 +88,15 @@ class SurfaceTool(PressingTool):
             object.__setattr__(self, "over", checked_box(self.over))
         if self.element is not None:
             checks.positive("The element under a tool", self.element, "m")
-        self.require_resolved(self._size_of_elements())
+        self.require_fine_elements(self._size_of_elements())
 
     def __str__(self) -> str:
         pad = "rigid" if isinstance(self.pad, str) else f"pad {number(self.pad)} N/m³"
-        return f"{self.posed} on {self.touches!r}, {pad}"
+        return f"{self.posed_tool} on {self.touches!r}, {pad}"
 
     def describe(self) -> dict[str, Any]:
         """Return everything that decides its energy, as plain data for a JSON file."""
-        return {**super().describe(), **self.posed.describe()}
+        return {**super().describe(), **self.posed_tool.describe()}
 
     @property
     def stop(self) -> float | None:
@@ -104,30 +104,30 @@ class SurfaceTool(PressingTool):
         return None if self.pad == RIGID else min(STOP, self.shape.least_radius)
 
     @property
-    def posed(self) -> PosedTool:
+    def posed_tool(self) -> PosedTool:
         """The tool in its orientation."""
         return PosedTool(self.shape, self.rotation)
 
     @property
     def turn(self) -> np.ndarray | None:
         """Rotation (3, 3) from the tool's frame to the body's; None for none."""
-        return self.posed.turn
+        return self.posed_tool.turn
 
     @property
     def to_centre(self) -> np.ndarray:
         """Way (3,) in m from the tool's place to its shape's centre."""
-        return self.posed.to_centre
+        return self.posed_tool.to_centre
 
     def offset(self, normals: np.ndarray) -> np.ndarray:
         """Return how high (N,) in m the place is above a plane of unit normals (N, 3) that the tool just touches."""
-        return np.asarray(self.posed.reach(normals) - normals @ self.to_centre)
+        return np.asarray(self.posed_tool.reach(normals) - normals @ self.to_centre)
 
     def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
         """Return the ranges of tip_x, tip_y and tip_z in m: the box around all its places."""
         self._require_room(geometry)
         return super().ranges(geometry)
 
-    def require_resolved(self, element: float) -> None:
+    def require_fine_elements(self, element: float) -> None:
         """Refuse elements of a size in m that are too large for the tool's edge.
 
         Raises

@@ -133,8 +133,10 @@ class Contact:
         """
         if self.stop is None or self._fixed_part is None:
             return False
-        reach = self.shape.inscribed - self.stop
-        count = max(2, int(np.ceil(np.linalg.norm(place - outside) / (WAY * self.shape.inscribed))) + 1)
+        reach = self.shape.inscribed_radius - self.stop
+        count = max(
+            2, int(np.ceil(np.linalg.norm(place - outside) / (WAY * self.shape.inscribed_radius))) + 1
+        )
         way = self._centre(outside) + np.linspace(0, 1, count)[:, None] * (place - outside)
         low, high = self._fixed_part.box
         near = (way > low - reach).all(axis=1) & (way < high + reach).all(axis=1)

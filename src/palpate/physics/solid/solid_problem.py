@@ -95,7 +95,7 @@ class SolidProblem:
         for interaction in self.interactions:
             advise_on_sizes(interaction, self.element, self.longest)
             if isinstance(interaction, SurfaceTool) and self.element is not None:
-                interaction.require_resolved(self.element)
+                interaction.require_fine_elements(self.element)
             if isinstance(interaction, SphereProbe) and interaction.pad != RIGID:
                 advise_on_pad(interaction, self.body.materials)
 

@@ -61,7 +61,7 @@ class ToolBaseline(ContactBaseline):
 
     def __post_init__(self) -> None:
         try:
-            _ = self.posed
+            _ = self.posed_tool
         except (ValueError, KeyError, TypeError) as error:
             raise UsageError(
                 "The baseline of a tool tells of no tool.",
@@ -70,17 +70,17 @@ class ToolBaseline(ContactBaseline):
             ) from error
 
     def __str__(self) -> str:
-        return f"{self.posed}; {self.law}"
+        return f"{self.posed_tool}; {self.law}"
 
     @property
-    def posed(self) -> PosedTool:
+    def posed_tool(self) -> PosedTool:
         """The tool in its orientation."""
         return PosedTool.of(json.loads(self.tool))
 
     @property
     def probe_words(self) -> str:
         """The tool in a few words."""
-        return f"a {self.posed}"
+        return f"a {self.posed_tool}"
 
     def c_source(self) -> str:
         """Refuse: a tool has no exported form yet.

@@ -16,8 +16,29 @@ from palpate.tools.tool_shape import Tool, length, norm, parts, positive, where_
 __all__ = ["Capsule", "Cone", "Fingertip", "Sphere"]
 
 
+class _Round(Tool):
+    """A tool whose front, least radius and size are one radius."""
+
+    radius: float  # m
+
+    @property
+    def front(self) -> float:
+        """The radius in m."""
+        return self.radius
+
+    @property
+    def least_radius(self) -> float:
+        """The radius in m."""
+        return self.radius
+
+    @property
+    def size(self) -> float:
+        """The radius in m."""
+        return self.radius
+
+
 @dataclass(frozen=True)
-class Sphere(Tool):
+class Sphere(_Round):
     """A ball.
 
     Attributes
@@ -47,21 +68,6 @@ class Sphere(Tool):
         """Return the reach (N,) in m along unit directions (N, 3)."""
         return np.full(len(direction), self.radius)
 
-    @property
-    def front(self) -> float:
-        """The radius in m."""
-        return self.radius
-
-    @property
-    def least_radius(self) -> float:
-        """The radius in m."""
-        return self.radius
-
-    @property
-    def size(self) -> float:
-        """The radius in m."""
-        return self.radius
-
     def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and y of the cut at a depth in m."""
         half = _half_chord(self.radius, depth)
@@ -69,7 +75,7 @@ class Sphere(Tool):
 
 
 @dataclass(frozen=True)
-class Capsule(Tool):
+class Capsule(_Round):
     """A cylinder that lies along x, with half balls as its ends.
 
     Attributes
@@ -113,21 +119,6 @@ class Capsule(Tool):
     def support(self, direction: np.ndarray) -> np.ndarray:
         """Return the reach (N,) in m along unit directions (N, 3)."""
         return np.asarray(self._half * np.abs(direction[:, 0]) + self.radius)
-
-    @property
-    def front(self) -> float:
-        """The radius in m."""
-        return self.radius
-
-    @property
-    def least_radius(self) -> float:
-        """The radius in m."""
-        return self.radius
-
-    @property
-    def size(self) -> float:
-        """The radius in m."""
-        return self.radius
 
     def half_widths(self, depth: float) -> tuple[float, float]:
         """Return half the width in m along x and y of the cut at a depth in m."""

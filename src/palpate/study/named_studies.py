@@ -94,7 +94,7 @@ _COARSE: dict[str, tuple[float, float, dict[str, Any]]] = {
     "breast-dome": (0.020, 0.010, {"depth": (2e-4, 0.006)}),
     "liver": (0.030, 0.012, {"depth": (2e-4, 0.008)}),
     "phantom": (0.020, 0.010, {"depth": (2e-4, 0.005)}),
-    "fingertip": (0.025, 0.007, {"depth": (2e-4, 0.004)}),
+    "fingertip": (0.025, 0.005, {"depth": (2e-4, 0.004)}),
     "grasp": (0.020, 0.012, {}),
 }
 # thin layers and round bodies keep more elements, so that a solve takes longer; of liver and phantom it takes 5 s, and
@@ -113,7 +113,7 @@ _LESS: dict[str, dict[str, dict[str, Any]]] = {
         "sweep": {"samples": 16},
         "test": {"samples": 8},
     },
-    "fingertip": {"sweep": {"samples": 16}, "test": {"samples": 8}},
+    "fingertip": {"sweep": {"samples": 12}, "test": {"samples": 8}},
     "grasp": {"sweep": {"samples": 12}, "test": {"samples": 12}},
 }
 _QUICK: dict[str, Any] = {

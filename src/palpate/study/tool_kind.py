@@ -12,9 +12,15 @@ from palpate.records import Metres, PadStiffness, Pair, Radians, Record, Triple
 from palpate.study.interaction_records import OnSurface, require_corners, stiffness_or_rigid
 from palpate.study.probe_kind import ProbeLearningRecord, ProbeTestRecord
 from palpate.study.stage_records import SECTIONS, PressSweepRecord, TouchTargetRecord
-from palpate.tools import Box, Capsule, Cone, Cylinder, Fingertip, Punch, Sphere, Tool
+from palpate.tools import Box, Capsule, Cone, Cylinder, Fingertip, PosedTool, Punch, Sphere, Tool
+from palpate.tools.tool_sizes import TURNS, USUAL, sizes_of
 
-__all__ = ["SHAPES", "ToolRecord", "ToolShape", "ToolSweepRecord", "shape_record"]
+__all__ = ["SHAPES", "ToolRecord", "ToolShape", "ToolSweepRecord", "tool_tables"]
+
+
+def _size(name: str, size: str, text: str) -> Any:
+    """Return the key of a size of a shape, with its usual length or angle."""
+    return Field(sizes_of(PosedTool(USUAL[name]))[size], gt=0, description=text)
 
 
 class ShapeRecord(Record):
@@ -40,7 +46,7 @@ class SphereShape(ShapeRecord):
 
     tool = Sphere
     kind: Literal["sphere"] = "sphere"
-    radius: Metres = Field(0.010, gt=0, description="of the ball")
+    radius: Metres = _size("sphere", "radius", "of the ball")
 
 
 class CapsuleShape(ShapeRecord):
@@ -48,8 +54,8 @@ class CapsuleShape(ShapeRecord):
 
     tool = Capsule
     kind: Literal["capsule"] = "capsule"
-    radius: Metres = Field(0.006, gt=0, description="of the bar and its ends")
-    length: Metres = Field(0.024, gt=0, description="from end to end")
+    radius: Metres = _size("capsule", "radius", "of the bar and its ends")
+    length: Metres = _size("capsule", "length", "from end to end")
 
 
 class CylinderShape(ShapeRecord):
@@ -57,9 +63,9 @@ class CylinderShape(ShapeRecord):
 
     tool = Cylinder
     kind: Literal["cylinder"] = "cylinder"
-    radius: Metres = Field(0.006, gt=0, description="of the cylinder")
-    length: Metres = Field(0.024, gt=0, description="from end to end")
-    edge: Metres = Field(0.002, gt=0, description="radius of the rounded edges of its ends")
+    radius: Metres = _size("cylinder", "radius", "of the cylinder")
+    length: Metres = _size("cylinder", "length", "from end to end")
+    edge: Metres = _size("cylinder", "edge", "radius of the rounded edges of its ends")
 
 
 class PunchShape(ShapeRecord):
@@ -67,8 +73,8 @@ class PunchShape(ShapeRecord):
 
     tool = Punch
     kind: Literal["punch"] = "punch"
-    radius: Metres = Field(0.008, gt=0, description="of the bar")
-    edge: Metres = Field(0.002, gt=0, description="radius of the rounded edge of its end")
+    radius: Metres = _size("punch", "radius", "of the bar")
+    edge: Metres = _size("punch", "edge", "radius of the rounded edge of its end")
 
 
 class ConeShape(ShapeRecord):
@@ -76,8 +82,8 @@ class ConeShape(ShapeRecord):
 
     tool = Cone
     kind: Literal["cone"] = "cone"
-    half_angle: Radians = Field(1.0471975511965976, gt=0, description="between its axis and its side")
-    tip: Metres = Field(0.004, gt=0, description="radius of the rounded tip")
+    half_angle: Radians = _size("cone", "half_angle", "between its axis and its side")
+    tip: Metres = _size("cone", "tip", "radius of the rounded tip")
 
 
 class BoxShape(ShapeRecord):
@@ -85,10 +91,10 @@ class BoxShape(ShapeRecord):
 
     tool = Box
     kind: Literal["box"] = "box"
-    size_x: Metres = Field(0.020, gt=0, description="length along x")
-    size_y: Metres = Field(0.016, gt=0, description="length along y")
-    size_z: Metres = Field(0.010, gt=0, description="length along z")
-    edge: Metres = Field(0.002, gt=0, description="radius of its rounded edges")
+    size_x: Metres = _size("box", "size_x", "length along x")
+    size_y: Metres = _size("box", "size_y", "length along y")
+    size_z: Metres = _size("box", "size_z", "length along z")
+    edge: Metres = _size("box", "edge", "radius of its rounded edges")
 
 
 class FingertipShape(ShapeRecord):
@@ -96,9 +102,9 @@ class FingertipShape(ShapeRecord):
 
     tool = Fingertip
     kind: Literal["fingertip"] = "fingertip"
-    size_x: Metres = Field(0.018, gt=0, description="length along x")
-    size_y: Metres = Field(0.016, gt=0, description="length along y")
-    size_z: Metres = Field(0.014, gt=0, description="length along z, in which it presses")
+    size_x: Metres = _size("fingertip", "size_x", "length along x")
+    size_y: Metres = _size("fingertip", "size_y", "length along y")
+    size_z: Metres = _size("fingertip", "size_z", "length along z, in which it presses")
 
 
 ToolShape: TypeAlias = (
@@ -152,6 +158,10 @@ class ToolRecord(OnSurface):
         require_corners(self.over)
         return self
 
+    def build_tool(self) -> PosedTool:
+        """Return the tool in its orientation."""
+        return PosedTool(self.shape.build(), self.rotation)
+
     def build(self, body: Any, *, whole: bool = True, element: float | None = None) -> SurfaceTool:
         """Return the tool, over all of its places, with elements of a size in m beneath it."""
         return SurfaceTool(
@@ -165,9 +175,10 @@ class ToolRecord(OnSurface):
         )
 
 
-def shape_record(kind: str, sizes: dict[str, Any]) -> ShapeRecord:
-    """Return the record of a shape by its name, with sizes by their names; the others are the usual ones."""
-    return SHAPES[kind].model_validate(sizes)
+def tool_tables(name: str, tool: PosedTool) -> dict[str, Any]:
+    """Return what a study says of a tool by its name: the kind, the shape with its sizes, the rotation."""
+    sizes = {key: value for key, value in sizes_of(tool).items() if key not in TURNS}
+    return {"kind": "tool", "shape": {"kind": name, **sizes}, "rotation": tool.rotation}
 
 
 class ToolSweepRecord(PressSweepRecord):

@@ -212,7 +212,7 @@ class Timing {
 
 /** The line under the body's name: the probe, and the ranges that were trained. */
 function subtitle(hello: Hello): (Node | string)[] {
-  const probe = [`probe of radius ${measured(hello.radius, "m")}`, `trained to ${measured(hello.deepest, "m")} deep`];
+  const probe = [hello.tool?.words ?? `probe of radius ${measured(hello.radius, "m")}`, `trained to ${measured(hello.deepest, "m")} deep`];
   const ranges = hello.holds ? hello.inputs : hello.parameters;
   const parts = [...(hello.holds ? [] : probe.map(whole)), ...trained(ranges)];
   const joined = parts.flatMap((part, i) => (i === 0 ? [part] : [", ", part]));

@@ -5,6 +5,7 @@ import type { Link } from "./connection";
 import type { Pad } from "./gamepad";
 import { Hand } from "./hand";
 import type { Hello, Vec3 } from "./messages";
+import type { ToolShape } from "./tool_shape";
 import type { PressView, Spot } from "./touch_view";
 
 const SINK = 90; // ms, time constant with which the probe takes a new depth: a press and no blow
@@ -25,7 +26,6 @@ export class PressHand extends Hand {
   /** m, of the rigid probe in the surface at rest */
   wanted = 0;
   most = 0;
-  radius = 0;
   /** Hears of a depth that wheel or keys have set. */
   deepened: (depth: number) => void = () => {};
 
@@ -36,7 +36,12 @@ export class PressHand extends Hand {
   private force = NaN; // of a pen or a trigger, 0 … 1
   private lastTick = 0;
 
-  constructor(canvas: HTMLCanvasElement, connection: Link, hello: Hello) {
+  constructor(
+    canvas: HTMLCanvasElement,
+    connection: Link,
+    hello: Hello,
+    private readonly shape: ToolShape,
+  ) {
     super(canvas, connection, hello);
     if (hello.device) return; // a device holds the hand
     canvas.addEventListener("pointerleave", () => this.pointer === null && !this.grabbed && this.hover(null));
@@ -79,14 +84,14 @@ export class PressHand extends Hand {
     document.documentElement.dataset["sinking"] = String(on);
     if (!this.view) return;
     this.view.turnable = !on;
-    if (on) this.view.point(null, this.radius);
+    if (on) this.view.point(null, this.shape);
   }
 
-  /** The probe's centre. */
+  /** The ball's centre, or the tool's place. */
   protected override wish(): Vec3 {
     const { hello, spot } = this;
     if (!spot) return [0, 0, 0];
-    const lift = this.radius - this.depth;
+    const lift = this.shape.lift(spot.normal) - this.depth;
     return [0, 1, 2].map((k) => spot.point[k]! + lift * spot.normal[k]! - hello.centre[k]!) as Vec3;
   }
 
@@ -163,7 +168,7 @@ export class PressHand extends Hand {
   private hover(spot: Spot | null): void {
     const on = spot?.touchable ? spot : null;
     this.canvas.dataset["cursor"] = on ? "grab" : "";
-    this.view?.point(on, this.radius);
+    this.view?.point(on, this.shape);
   }
 
   private wheel(e: WheelEvent): void {

@@ -178,6 +178,7 @@ class PressedBody implements Body {
     const { radius_parameter: own, radius } = this.hello;
     if (own >= 0) this.shape.radius = frame.parameters[own] ?? radius;
     this.shape.follow(frame.parameters);
+    this.hand.inForce = frame.parameters;
     this.draw();
   }
 

@@ -114,14 +114,14 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
         study = _suit_depth(study)
     study = with_rim(study)
     if options.tool is not None:
-        study = with_tool(study, options)
+        study = _with_tool(study, options)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
 
 
-def with_tool(study: Study, options: PartOptions) -> Study:
+def _with_tool(study: Study, options: PartOptions) -> Study:
     """Return the study of a part under the tool of the options, in place of the ball that suits the part."""
-    from palpate.viewer.shown_part import require_room_for_tool
+    from palpate.viewer.shown_part import require_room_for_tool, require_round_edge
 
     body, ball = study.body, study.interaction
     assert isinstance(body, PartRecord)
@@ -136,6 +136,7 @@ def with_tool(study: Study, options: PartOptions) -> Study:
         )
     low, high = body.bare().skin.corners
     require_room_for_tool(tool, high - low)
+    require_round_edge(tool)
     content = under_tool(study.model_dump(), name, tool)
     if options.depth is None:
         deepest = tool_depth(tool.shape, ball.depth[1])

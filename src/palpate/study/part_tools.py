@@ -8,11 +8,16 @@ from palpate.study.part_rim import RIM
 from palpate.study.tool_kind import tool_tables
 from palpate.tools import PosedTool, Tool
 
-__all__ = ["COARSE", "tool_depth", "under_ball", "under_tool"]
+__all__ = ["COARSE", "rough_element", "tool_depth", "under_ball", "under_tool"]
 
 COARSE = 0.5  # element over the radius: coarser ones do not feel the ball
 EDGE_ELEMENT = 2.0  # element over the least radius of curvature of a tool, at most
 DEEP = 0.75  # depth over a tool's size, at most, unless somebody chooses it
+
+
+def rough_element(shape: Tool) -> float:
+    """Return the size in m of the largest elements that see a tool and its edge."""
+    return float(min(shape.size, EDGE_ELEMENT * shape.least_radius))
 
 
 def tool_depth(shape: Tool, depth: float) -> float:
@@ -40,7 +45,10 @@ def under_tool(content: dict[str, Any], name: str, tool: PosedTool) -> dict[str,
     known |= {key: acting[key] for key in ("pad", "over") if acting["kind"] == "tool"}
     sweep.pop("symmetric", None)
     if sweep.get("element") is not None:
-        finest = max(COARSE / 4 * tool.shape.size, min(COARSE * tool.shape.size, EDGE_ELEMENT * tool.shape.least_radius))
+        finest = max(
+            COARSE / 4 * tool.shape.size,
+            min(COARSE * tool.shape.size, EDGE_ELEMENT * tool.shape.least_radius),
+        )
         sweep["element"] = float(f"{min(sweep['element'], finest):.4g}")
     body = content["body"]
     surfaces = tuple(surface for surface in body["surfaces"] if surface["name"] != RIM)

@@ -150,6 +150,7 @@ def _body_of_solutions(solutions: list[Any], name: str) -> ShownBody:
         steps=[_step_of(solution) for solution in good],
         units={VON_MISES: "Pa"},
         fixed=np.isin(mesh.surface_of, numbers),
+        tool=getattr(good[0], "tool", None),
     )
 
 
@@ -158,7 +159,8 @@ def _step_of(solution: Any) -> ShownStep:
 
     fields = {VON_MISES: "von_mises", STRETCH: "largest_stretch"}
     known = {name: getattr(solution, attribute, None) for name, attribute in fields.items()}
-    ball = ball_of(solution, True)
+    tool, pose = getattr(solution, "tool", None), getattr(solution, "pose", None)
+    ball = ball_of(solution, True) if tool is None or pose is None else (pose[:3], tool.shape.size)
     return ShownStep(
         displacement=solution.displacement,
         values={name: values for name, values in known.items() if values is not None},
@@ -224,7 +226,9 @@ def body_of_dataset(dataset: Any, name: str) -> ShownBody:
     radius, tool = _radius(origin), _tool(origin)
     rest = np.asarray(data["rest"].values, dtype=float)
     steps = [_sample(data, int(row), radius) for row in rows]
-    return ShownBody(name, rest, np.asarray(data["triangles"].values), steps, fixed=_fixed(data, origin), tool=tool)
+    return ShownBody(
+        name, rest, np.asarray(data["triangles"].values), steps, fixed=_fixed(data, origin), tool=tool
+    )
 
 
 def _sample(data: Any, row: int, radius: float | None) -> ShownStep:
@@ -254,7 +258,9 @@ def _fixed(data: Any, origin: Any) -> np.ndarray | None:
 def _tool(origin: Any) -> PosedTool | None:
     """Return the tool of which a record of how a dataset was made tells."""
     acting = origin.get("problem", {}).get("interactions", ())
-    tools = [PosedTool.of(one) for one in acting if isinstance(one, dict) and one.get("type") == "SurfaceTool"]
+    tools = [
+        PosedTool.of(one) for one in acting if isinstance(one, dict) and one.get("type") == "SurfaceTool"
+    ]
     return tools[0] if len(tools) == 1 else None
 
 

@@ -26,7 +26,7 @@ NEAR = 0.25
 
 
 def finer_problem(problem: Any, places: np.ndarray) -> Any:
-    """Return a problem of a body, or of a family, whose mesh is twice as fine around the ball or tool at places (N, n ≥ 3).
+    """Return a problem of a body, or of a family, whose mesh is twice as fine around what presses at places (N, n ≥ 3).
 
     Elsewhere the mesh is as fine as that of `problem`, on which one ball or tool acts.
     """

@@ -2,8 +2,8 @@
 
     python -m benchmarks.many_cases [--quick] [--json] [--record]
 
-Each case is a spring whose answer is a division, so that what is measured is the sweep: chains handed out by Dask, a child
-process that solves, and parts on disk. The rival is the standard library's process pool with one task for each case,
+Each case is a spring whose answer is a product, so that what is measured is the sweep: chains handed out by Dask, a
+child process that solves, and parts on disk. The rival is the standard library's process pool with one task for each case,
 which keeps nothing, survives no crash and can't go on.
 """
 

@@ -130,7 +130,7 @@ KILLS = int(os.environ.get("PALPATE_KILLS", "5"))
 
 @pytest.mark.full
 @pytest.mark.timeout(60 + 20 * KILLS)
-def test_kills_lose_nothing_and_repeat_only_what_was_in_flight(tmp_path, slurm):
+def test_kills_lose_nothing_and_repeat_only_what_was_in_flight(tmp_path, slurm, record_property):
     chance, killed = random.Random(1), Counter()
     content = {"samples": 300, "seconds": 0.1}
     driver = start(tmp_path, slurm, **content)
@@ -152,7 +152,7 @@ def test_kills_lose_nothing_and_repeat_only_what_was_in_flight(tmp_path, slurm):
     assert driver.communicate(timeout=200)[1] == ""
     data = Dataset.open(tmp_path / "a.zarr")
     assert data.hash == sweep(Spring(), samples=300, workers=1, progress=False).hash
-    print(f"{killed}, {solves(tmp_path).total()} solves of 300 cases")
+    record_property("figures", f"{killed}, {solves(tmp_path).total()} solves of 300 cases")
     longest = max(rows.size for rows in make_plan(Spring(), None, 300, 0, None, None).chains())
     often = solves(tmp_path)
     assert len(often) == 300
@@ -171,6 +171,8 @@ def test_no_case_is_begun_in_a_job_that_ends_before_it(tmp_path, slurm):
 
 def test_a_chain_longer_than_a_job_is_said(cluster):
     plan = make_plan(Spring(seconds=0.05), None, 8, 0, None, None)
-    with connect(cluster, None) as machines, pytest.raises(ResourceError, match="too short for this sweep"):
+    asked = (plan.problem, plan.schema, plan.points, plan.chains(), lambda *_: None, 60.0)
+    with connect(cluster, None) as machines:
         short = replace(machines, job_seconds=0.2)
-        run(short, plan.problem, plan.schema, plan.points, plan.chains(), lambda *_: None, 60.0, slowest=0.05)
+        with pytest.raises(ResourceError, match="too short for this sweep"):
+            run(short, *asked, slowest=0.05)

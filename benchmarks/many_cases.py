@@ -3,7 +3,7 @@
     python -m benchmarks.many_cases [--quick] [--json] [--record]
 
 Each case is a spring whose answer is a product, so that what is measured is the sweep: chains handed out by Dask, a
-child process that solves, and parts on disk. The rival is the standard library's process pool with one task for each case,
+child process that solves, and parts on disk. The rival is the standard library's process pool with one task for a case,
 which keeps nothing, survives no crash and can't go on.
 """
 

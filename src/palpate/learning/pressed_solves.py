@@ -79,6 +79,7 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
             radius_input=pressed.radius_input,
             options=field,
             drawn=pressed.drawn,
+            shift=pressed.shift,
         )
 
     own, options = request.split("law", "length", "deviation")
@@ -119,6 +120,7 @@ class PressedSolves:
         None  # the body's own surface, of a file; its triangles are then in four parts
     )
     tool: str | None = None  # description of a tool as JSON; None of a sphere
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # way from the place to the ball's centre, m
 
     @classmethod
     def of(cls, data: Dataset, layout: Layout | None = None) -> PressedSolves:
@@ -170,6 +172,7 @@ class PressedSolves:
             None if rim is None else (rest[triangles[touched]], rest[triangles[~touched]]),
             drawn,
             None if tool is None else json.dumps(tool.describe(), sort_keys=True),
+            (float(shift[0]), float(shift[1]), float(shift[2])),
         )
 
     @property

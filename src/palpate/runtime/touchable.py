@@ -25,10 +25,12 @@ from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import Field, LearntEnergy, NodeField, Surrogate, TouchedSurface
+from palpate.surrogates.baselines import deepest_ball
 from palpate.surrogates.fields import line_of
 from palpate.surrogates.memories import Memory
 from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.surrogate import correction_count, correction_warning
+from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 
 __all__ = ["Touchable", "aim_device", "load_touchable", "touchable"]
@@ -70,6 +72,20 @@ class Touchable:
     def surface(self) -> TouchedSurface | None:
         """The touched surface at rest, where a free probe touches one; otherwise None."""
         return self.energy.baseline.surface
+
+    @property
+    def tool(self) -> PosedTool | None:
+        """The rigid tool that presses, in the orientation in which its further inputs find it; None of a ball."""
+        tool = getattr(self.energy.baseline, "posed_tool", None)
+        return tool if isinstance(tool, PosedTool) else None
+
+    @cached_property
+    def shift(self) -> np.ndarray:
+        """Way (3,) in m from a tool's place to the centre of the ball whose depth counts; zero of a ball.
+
+        `surface` is the body's less this way, so that it takes places.
+        """
+        return np.zeros(3) if self.tool is None else deepest_ball(self.tool, self.normal)[1]
 
     @property
     def holds(self) -> bool:

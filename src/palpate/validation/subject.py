@@ -19,7 +19,15 @@ from palpate.learning import History
 from palpate.learning.bent_body import hand_coordinates
 from palpate.learning.learn_dataset import LearningHistory, filter_record
 from palpate.network import TrainedRegion
-from palpate.surrogates import Field, FieldSurrogate, LearntEnergy, LearntQuantities, NodeField, Surrogate
+from palpate.surrogates import (
+    Field,
+    FieldSurrogate,
+    LearntEnergy,
+    LearntQuantities,
+    LumpContrast,
+    NodeField,
+    Surrogate,
+)
 from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
@@ -45,6 +53,7 @@ class Subject:
     solves: TouchSolves | None = None
     data: Dataset | None = None  # unseen rows, with displacements
     field: FieldSurrogate | None = None  # the displacement that is shown
+    lumps: LumpContrast | None = None  # what hidden lumps add
     loads: Surrogate | None = None  # networks that answer by load
     body: Surrogate | None = None  # a body with memory
     histories: Dataset | None = None  # unseen, of that body
@@ -178,6 +187,7 @@ def _by_place(
         solves=solves,
         data=solves.data,
         field=field,
+        lumps=None if surrogate is None else surrogate.lumps,
         refined=None if refined is None else _solves(refined, function, energy),
         strokes=strokes,
         seed=seed,

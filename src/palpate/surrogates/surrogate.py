@@ -11,7 +11,7 @@ from __future__ import annotations
 import html
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,8 @@ from palpate.surrogates.fields import (
     surface_fields,
 )
 from palpate.surrogates.learnt_quantities import LearntQuantities
+from palpate.surrogates.lumps import Lump, LumpContrast
+from palpate.surrogates.lumps.lump_units import energy_with_lumps
 from palpate.surrogates.memories import Memory, Patches
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.surrogates.moving_rest import Followed, follow
@@ -67,6 +69,8 @@ class Surrogate:
         there.
     quantities : mapping of name to LearntQuantities
         Numbers of the inputs, each group learnt together; may be empty.
+    lumps : LumpContrast, optional
+        What hidden lumps would add to the energy, for `with_lumps`.
 
     Raises
     ------
@@ -80,6 +84,7 @@ class Surrogate:
     memory: Memory | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
     quantities: Mapping[str, LearntQuantities] = field(default_factory=dict)
+    lumps: LumpContrast | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fields", dict(self.fields))
@@ -332,6 +337,34 @@ class Surrogate:
         if memory is not None and spacing is not None:
             memory = memory.spread(self._patches(spacing), spacing)
         return replace(self, memory=memory)
+
+    def with_lumps(self, lumps: Iterable[Lump]) -> Surrogate:
+        """Return the body with hidden lumps: what a hand feels of it changes, what is drawn and remembered does not.
+
+        The energy of the lumps is added to that of the body, which holds while they are apart. The new body has
+        further units in its network and is evaluated, saved and exported as any other; its file holds the lumps as
+        numbers that whoever opens it can read.
+
+        Parameters
+        ----------
+        lumps : iterable of Lump
+            Balls in the room that ``self.lumps.room`` tells; none for the body without.
+
+        Raises
+        ------
+        UsageError
+            If the body was not learnt with lumps, or one leaves its room or the skin, or two meet.
+        """
+        chosen = tuple(lumps)
+        if self.lumps is None:
+            raise UsageError(
+                f"{self.name!r} knows nothing of lumps.",
+                why="It was learnt from presses whose strain energy was not looked up.",
+                fix="Sweep a `palpate.LumpProblem` and learn that.",
+            )
+        hidden = [[*lump.place, lump.radius, lump.ratio] for lump in chosen]
+        energy = energy_with_lumps(self.hand_energy, self.lumps, chosen)
+        return replace(self, energy=energy, lumps=None, meta={**self.meta, "lumps": hidden})
 
     def follow(self, X: np.ndarray, times: np.ndarray | None = None) -> Followed:
         """Return what the body answers along a history that begins before anything was done to it.

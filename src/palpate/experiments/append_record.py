@@ -23,7 +23,9 @@ from palpate.files import system_errors
 
 __all__ = ["AppendRecord", "Clocks", "read_events"]
 
-JUMP = 2.0  # s by which wall and steady clock may disagree between two events: more is a jump of the wall clock
+JUMP = (
+    2.0  # s by which wall and steady clock may disagree between two events: more is a jump of the wall clock
+)
 _FAR = 2**30  # byte of the file that Windows locks: others must be able to read the events
 
 

@@ -20,10 +20,18 @@ from typing import Any
 
 from palpate.errors import PalpateError, UsageError
 from palpate.experiments.append_record import read_events
-from palpate.experiments.exam_lumps import Lump
 from palpate.files import system_errors, writing
+from palpate.surrogates import Lump
 
-__all__ = ["EVENTS", "FELT", "PastExamination", "exam_directory", "keep_body", "make_folder", "past_examinations"]
+__all__ = [
+    "EVENTS",
+    "FELT",
+    "PastExamination",
+    "exam_directory",
+    "keep_body",
+    "make_folder",
+    "past_examinations",
+]
 
 EVENTS, FELT = "events.jsonl", "felt.palpate"
 
@@ -105,9 +113,7 @@ class PastExamination:
     @property
     def lumps(self) -> tuple[Lump, ...]:
         """The lumps that were hidden."""
-        return tuple(
-            Lump(tuple(lump["place"]), lump["radius"], lump["ratio"]) for lump in self.facts["lumps"]
-        )
+        return tuple(Lump((x, y, z), radius, ratio) for x, y, z, radius, ratio in self.facts["lumps"])
 
     @property
     def ended(self) -> bool:

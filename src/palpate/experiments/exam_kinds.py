@@ -8,13 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.experiments.exam_lumps import Lump, require_inside
+from palpate.experiments.exam_lumps import require_inside
+from palpate.experiments.exam_touch import ExamSurface
 from palpate.runtime.touchable import Touchable
+from palpate.surrogates import Lump, LumpContrast
 
 __all__ = ["HARD", "KINDS", "ExamKind", "hide_lumps", "kind_of_body"]
 
 SOFT_RATIO, HARD_RATIO = 3.0, 10.0  # of moduli: rubbery, and like stone beside tissue
 HARD = 5.0  # ratio from which a lump counts as hard
+_NONE = 0.2  # share of examinations without a lump
 _TRIES = 300  # places that are tried for a lump before it is left out
 _APART = 1.0  # distance of two lumps' middles, over the sum of their diameters, at least
 
@@ -38,11 +41,11 @@ class ExamKind:
 
 
 _HOW = (
-    "Press the body and feel for places that are harder than what surrounds them. Cover all of it, strip by strip, and press "
-    "each place lightly, then deeper: a deep lump is felt by a deep press alone. There may be several lumps, or none. Where you "
-    "find one, mark the place, and say whether it is hard or soft, and whether it lies deep or shallow. First practise: "
-    "there each mark is answered at once. In the examination nothing is answered until you end it; then you see what you "
-    "found and missed, false alarms, how much of the body you covered and how deep, your force, time and order."
+    "Press it and feel for places that are harder than what surrounds them. Cover all of it, strip by strip, and "
+    "press each place lightly, then deeply: only a deep press reaches a deep lump. There may be several lumps, or "
+    "none. Where you find one, mark the place, and say whether it is hard or soft, deep or shallow. First practise: "
+    "there each mark is answered at once. In the examination nothing is answered until you end it. Then you see what "
+    "you found and missed, false alarms, how much you covered and how deep, your force, your time and your order."
 )
 
 KINDS = {
@@ -57,7 +60,7 @@ KINDS = {
             "This is a model of a prostate under the rectal wall. " + _HOW,
         ),
         ExamKind(
-            "skin", "Examination of skin and what lies beneath", (0.005, 0.008, 0.012), (0.0015, 0.003), (0.005, 0.009), 4,
+            "skin", "Examination of skin", (0.005, 0.008, 0.012), (0.0015, 0.003), (0.005, 0.009), 4,
             "This is a model of skin, fat and muscle. " + _HOW,
         ),
     )
@@ -79,7 +82,7 @@ def kind_of_body(name: str, body: Touchable) -> ExamKind:
 
 
 def hide_lumps(
-    kind: ExamKind, body: Touchable, points: np.ndarray, touched: np.ndarray, seed: int
+    kind: ExamKind, body: Touchable, surface: ExamSurface, seed: int, learnt: LumpContrast | None = None
 ) -> tuple[Lump, ...]:
     """Return the lumps of an examination, the same for the same seed; one in five examinations has none.
 
@@ -91,32 +94,42 @@ def hide_lumps(
         Sizes of lumps.
     body : Touchable
         The body without lumps.
-    points : (N, 3) array
-        Points of its surface at rest, m.
-    touched : (k,) int array
-        Those where a hand may press.
+    surface : ExamSurface
+        Its surface, under which they are hidden.
     seed : int
         Of the draw.
+    learnt : LumpContrast, optional
+        The lumps that the body has learnt: only such are hidden then.
     """
     rng = np.random.default_rng(seed)
-    if rng.random() < 0.2 or not len(touched):
+    touched = np.flatnonzero(surface.reachable)
+    if rng.random() < _NONE or not len(touched) or body.surface is None:
         return ()
-    assert body.surface is not None
-    _, slope, _ = body.surface.at(points[touched])
+    _, slope, _ = body.surface.at(surface.points[touched])
     normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
-    sorts = [(d, c, r) for d in kind.diameters for c in (kind.shallow, kind.deep) for r in (SOFT_RATIO, HARD_RATIO)]
+    sorts = _sorts(kind, learnt)
     order = rng.permutation(len(sorts))[: int(rng.integers(1, kind.most + 1))]
     lumps: list[Lump] = []
     for diameter, cover, ratio in (sorts[k] for k in order):
         for _ in range(_TRIES):
             k = int(rng.integers(len(touched)))
             below = rng.uniform(*cover) + diameter / 2.0
-            x, y, z = (points[touched[k]] - below * normals[k]).tolist()
+            x, y, z = (surface.points[touched[k]] - below * normals[k]).tolist()
             lump = Lump((x, y, z), diameter / 2.0, ratio)
-            if _stands_alone(lump, lumps) and _is_inside(body, lump, points):
+            if _stands_alone(lump, lumps) and _fits(body, lump, surface, learnt):
                 lumps.append(lump)
                 break
     return tuple(lumps)
+
+
+def _sorts(kind: ExamKind, learnt: LumpContrast | None) -> list[tuple[float, tuple[float, float], float]]:
+    """Return diameter (m), range of cover (m) and ratio of all sorts of lumps, within what was learnt."""
+    diameters, ratios = kind.diameters, (SOFT_RATIO, HARD_RATIO)
+    if learnt is not None:
+        radius, ratio = learnt.room.radius, learnt.room.ratio
+        diameters = tuple(float(np.clip(d, 2.0 * radius.low, 2.0 * radius.high)) for d in diameters)
+        ratios = (max(SOFT_RATIO, ratio.low), min(HARD_RATIO, ratio.high))
+    return [(d, c, r) for d in dict.fromkeys(diameters) for c in (kind.shallow, kind.deep) for r in ratios]
 
 
 def _stands_alone(lump: Lump, others: Sequence[Lump]) -> bool:
@@ -126,9 +139,11 @@ def _stands_alone(lump: Lump, others: Sequence[Lump]) -> bool:
     )
 
 
-def _is_inside(body: Touchable, lump: Lump, points: np.ndarray) -> bool:
+def _fits(body: Touchable, lump: Lump, surface: ExamSurface, learnt: LumpContrast | None) -> bool:
     try:
-        require_inside(body, lump, points)
+        require_inside(body, lump, surface.points)
+        if learnt is not None:
+            learnt.require(body.energy, [lump])
     except UsageError:
         return False
     return True

@@ -16,19 +16,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.errors import UsageError
 from palpate.format import millimetres
+from palpate.surrogates import Lump, Surrogate
 
 if TYPE_CHECKING:
     from palpate.runtime.touchable import Touchable
-    from palpate.surrogates import Surrogate
 
-__all__ = ["Lump", "LumpPlace", "place_of", "require_inside", "schematic_lumps"]
+__all__ = [
+    "LumpPlace",
+    "added_energy_share",
+    "body_with_lumps",
+    "place_of",
+    "require_inside",
+    "schematic_lumps",
+]
 
 LEAST_COVER = 0.001  # m of tissue over a lump: thinner, it would be seen
 _TYPICAL = 2.0 / 3.0  # depth of a press, over the deepest trained one, for which the signal is set
@@ -36,39 +43,17 @@ _ESHELBY = 0.4
 # q at which a lump's unit g(q) is half as high, for each radial function; (1 + t)⁻³ is half as high at t = 2^⅓ − 1
 _HALF = {"gaussian": math.log(2.0), "inverse-multiquadric": 3.0, "matern-5/2": 1.0828}
 _HALF_WAY = math.sqrt(2.0 ** (1.0 / 3.0) - 1.0)  # a/h there
-_ALONG = 3.0  # width of the unit along the normal, over the depth of the lump: it hardly changes with the press
-
-
-@dataclass(frozen=True)
-class Lump:
-    """A hidden sphere: its middle in the body's coordinates (m), its radius (m) and its modulus over the body's."""
-
-    place: tuple[float, float, float]
-    radius: float
-    ratio: float
-
-    def __post_init__(self) -> None:
-        numbers = (*self.place, self.radius, self.ratio)
-        if len(self.place) != 3 or not all(math.isfinite(v) for v in numbers):
-            raise UsageError(f"{numbers} is no lump.", fix="Give three coordinates, radius and ratio: 5 numbers.")
-        if not (self.radius > 0.0 and self.ratio > 0.0):
-            raise UsageError(
-                f"A lump of radius {self.radius:g} m and ratio {self.ratio:g} can't be hidden.",
-                why="Both are sizes.",
-                fix="Give a radius in m and a ratio of moduli above zero.",
-            )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the lump as data for a record."""
-        return asdict(self) | {"place": list(self.place)}
+_ALONG = (
+    3.0  # width of the unit along the normal, over the depth of the lump: it hardly changes with the press
+)
 
 
 @dataclass(frozen=True)
 class LumpPlace:
-    """The place of a lump under the skin: the point of the skin above it, the outer normal there, and what covers it."""
+    """The place of a lump under the skin."""
 
-    above: np.ndarray  # (3,) m
-    normal: np.ndarray  # (3,)
+    above: np.ndarray  # (3,) m, the point of the skin above it
+    normal: np.ndarray  # (3,) outwards there
     cover: float  # m of tissue between skin and lump; negative where it looks out
 
 
@@ -86,6 +71,16 @@ def place_of(body: Touchable, lump: Lump) -> LumpPlace:
     return LumpPlace(place[0] - distance[0] * normal, normal, float(-distance[0] - lump.radius))
 
 
+def body_with_lumps(surrogate: Surrogate, body: Touchable, lumps: Sequence[Lump]) -> Surrogate:
+    """Return a body with hidden lumps: learnt ones where it knows any, schematic ones elsewhere.
+
+    `body` is the surrogate as a hand finds it.
+    """
+    if surrogate.lumps is not None:
+        return surrogate.with_lumps(lumps)
+    return schematic_lumps(surrogate, body, lumps)
+
+
 def require_inside(body: Touchable, lump: Lump, points: np.ndarray) -> LumpPlace:
     """Return a lump's place; refuse one that leaves the body, whose surface has the points (N, 3), m.
 
@@ -95,7 +90,7 @@ def require_inside(body: Touchable, lump: Lump, points: np.ndarray) -> LumpPlace
         If less than a millimetre of tissue covers the lump, or another side of the body is nearer than its radius.
     """
     at = place_of(body, lump)
-    size = f"The lump of ⌀ {millimetres(2 * lump.radius)} at {_in_words(lump.place)}"
+    size = f"The {lump}"
     if at.cover < LEAST_COVER:
         raise UsageError(
             f"{size} leaves the skin.",
@@ -114,10 +109,6 @@ def require_inside(body: Touchable, lump: Lump, points: np.ndarray) -> LumpPlace
 
 def _over(cover: float) -> str:
     return f"{millimetres(cover)} under the skin" if cover >= 0 else f"{millimetres(-cover)} above the skin"
-
-
-def _in_words(place: Sequence[float]) -> str:
-    return f"({', '.join(f'{1000 * v:.1f}' for v in place)}) mm"
 
 
 def added_energy_share(lump: Lump, cover: float, radius: float, depth: float) -> float:

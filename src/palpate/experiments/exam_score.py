@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.experiments.exam_folders import PastExamination
 from palpate.experiments.exam_kinds import HARD
-from palpate.experiments.exam_lumps import Lump, LumpPlace, place_of
+from palpate.experiments.exam_lumps import LumpPlace, place_of
 from palpate.experiments.exam_touch import (
     ExamSurface,
     ExamTouch,
@@ -24,6 +24,7 @@ from palpate.experiments.exam_touch import (
 from palpate.experiments.examination import Mark, standing_marks
 from palpate.format import count, duration, millimetres
 from palpate.runtime.touchable import Touchable, load_touchable
+from palpate.surrogates import Lump
 
 __all__ = ["ExamScore", "LumpResult", "match_marks", "score_examination", "share_interval"]
 
@@ -122,7 +123,7 @@ class ExamScore:
         return order_of_search(self.surface, self.touch)
 
     def right(self, answer: str) -> tuple[int, int]:
-        """Return how many marks that found a lump say its ``hardness`` or ``depth`` rightly, of how many that say it."""
+        """Return how many marks that found a lump say its ``hardness`` or ``depth`` rightly, and how many say it."""
         said = [r for r in self.results if r.mark is not None and getattr(r.mark, answer)]
         return sum(getattr(r.mark, answer) == getattr(r, answer) for r in said), len(said)
 
@@ -203,4 +204,6 @@ def score_examination(past: PastExamination, body: Touchable | None = None) -> E
     )
     ends = [event["elapsed"] for event in past.events if event["kind"] == "ended"]
     seconds = float(ends[0]) if ends else past.seconds
-    return ExamScore(past, results, tuple(marks), ExamSurface.of(body), read_touch(past.traces), seconds)
+    return ExamScore(
+        past, results, tuple(marks), ExamSurface.of(body), read_touch(past.traces, body), seconds
+    )

@@ -21,7 +21,15 @@ from palpate.errors import PalpateError
 if TYPE_CHECKING:
     from palpate.runtime.touchable import Touchable
 
-__all__ = ["ExamSurface", "ExamTouch", "Press", "SearchOrder", "order_of_search", "pressed_depths", "read_touch"]
+__all__ = [
+    "ExamSurface",
+    "ExamTouch",
+    "Press",
+    "SearchOrder",
+    "order_of_search",
+    "pressed_depths",
+    "read_touch",
+]
 
 LEVELS = {"lightly": 0.25, "half as deep as can be": 0.5, "deeply": 0.75}
 """Shares of the deepest trained press from which a place counts as pressed that deep."""
@@ -152,8 +160,11 @@ class ExamTouch:
         return np.asarray(touching[np.flatnonzero(np.diff(slots, prepend=-1.0))])
 
 
-def read_touch(traces: Sequence[Path]) -> ExamTouch:
-    """Return the ticks of an examination's recordings, one after the other; one that can't be read becomes a note."""
+def read_touch(traces: Sequence[Path], body: Touchable) -> ExamTouch:
+    """Return the ticks of an examination's recordings, one after the other; one that can't be read becomes a note.
+
+    The places are on the skin of the `body`: a recording tells where the probe's centre was.
+    """
     parts, notes, began = [], [], 0.0
     for path in traces:
         try:
@@ -169,6 +180,11 @@ def read_touch(traces: Sequence[Path]) -> ExamTouch:
     if not parts:
         return ExamTouch(np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0), tuple(notes))
     time, place, depth, force = (np.concatenate(column) for column in zip(*parts, strict=True))
+    touching = depth > _CONTACT
+    if body.surface is not None and touching.any():
+        distance, slope, _ = body.surface.at(place[touching])
+        normal = slope / np.linalg.norm(slope, axis=1, keepdims=True)
+        place[touching] -= distance[:, None] * normal
     return ExamTouch(time, place, depth, force, tuple(notes))
 
 
@@ -268,9 +284,7 @@ def order_of_search(surface: ExamSurface, touch: ExamTouch) -> SearchOrder:
     around = (lengths * np.sin(turned) ** 2).sum() / lengths.sum()
     before = times[:, None] - times[None, :] > _AGAIN
     near = np.linalg.norm(places[:, None] - places[None], axis=2) < surface.radius
-    return SearchOrder(
-        float(parallel), float(around), float((before & near).any(axis=1).mean()), len(steps)
-    )
+    return SearchOrder(float(parallel), float(around), float((before & near).any(axis=1).mean()), len(steps))
 
 
 def typical_force(touch: ExamTouch) -> tuple[float, float, float]:

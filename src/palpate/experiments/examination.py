@@ -12,7 +12,7 @@ from palpate.errors import UsageError
 from palpate.experiments.append_record import AppendRecord, Clocks
 from palpate.experiments.exam_folders import EVENTS, FELT, PastExamination, keep_body, make_folder
 from palpate.experiments.exam_kinds import ExamKind
-from palpate.experiments.exam_lumps import Lump
+from palpate.surrogates import Lump
 
 __all__ = ["ANSWERS", "Examination", "Mark", "standing_marks"]
 
@@ -83,7 +83,7 @@ class Examination:
             title=kind.title,
             depth_limit=kind.depth_limit,
             body=kept.name,
-            lumps=[lump.as_dict() for lump in lumps],
+            lumps=[[*lump.place, lump.radius, lump.ratio] for lump in lumps],
             **facts,
         )
         return exam
@@ -159,7 +159,6 @@ class Examination:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
 
 
 def standing_marks(events: Iterable[Mapping[str, Any]]) -> list[Mark]:

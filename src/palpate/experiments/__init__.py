@@ -6,7 +6,13 @@ exam_kinds         kinds of examination: what is hidden, and what the examiner i
 exam_folders       examinations on this machine: one folder each, never replaced
 examination        one examination while it is taken: marks, time, interruptions
 exam_touch         what was pressed: presses, depths over the surface, order of search
+exam_practice      practice: each mark is answered at once
 exam_score         what was found and missed, false alarms, area, force and time
 exam_report        the score as a page with a map of the body
 exam_page          the page on which a person examines
 """
+
+from palpate.experiments.exam_page import ExamPage, serve_exam
+from palpate.experiments.examination import Examination
+
+__all__ = ["ExamPage", "Examination", "serve_exam"]

@@ -47,7 +47,9 @@ class ExamNews(Json):
     notice: str  # what has just happened, in sentences; empty where there is nothing to say
     elapsed: float  # s since the examination began, without interruptions
     marks: tuple[ExamMark, ...]
-    lumps: tuple[ExamMark, ...]  # those that practice shows; none before it is asked, and none in an examination
+    lumps: tuple[
+        ExamMark, ...
+    ]  # those that practice shows; none before it is asked, and none in an examination
     former: tuple[FormerExam, ...]  # the latest first
     score: str  # name of the examination that has just ended; its score is at ``/exams/NAME``
 

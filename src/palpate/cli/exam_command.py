@@ -174,9 +174,10 @@ def _lump(text: str) -> Lump:
         )
     names = ("x", "y", "z", "radius")
     x, y, z, radius = (
-        parse_quantity(part, "m", f"The {name} of a lump") for part, name in zip(parts, names, strict=False)
+        parse_quantity(part, "m", f"The {name} of a lump", bare=True)
+        for part, name in zip(parts, names, strict=False)
     )
-    return Lump((x, y, z), radius, parse_quantity(parts[4], "", "The ratio of a lump"))
+    return Lump((x, y, z), radius, parse_quantity(parts[4], "", "The ratio of a lump", bare=True))
 
 
 def _past(directory: Path, name: str) -> PastExamination:

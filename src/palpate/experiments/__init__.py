@@ -11,8 +11,3 @@ exam_score         what was found and missed, false alarms, area, force and time
 exam_report        the score as a page with a map of the body
 exam_page          the page on which a person examines
 """
-
-from palpate.experiments.exam_page import ExamPage, serve_exam
-from palpate.experiments.examination import Examination
-
-__all__ = ["ExamPage", "Examination", "serve_exam"]

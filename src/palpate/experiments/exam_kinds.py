@@ -102,7 +102,7 @@ def hide_lumps(
         The lumps that the body has learnt: only such are hidden then.
     """
     rng = np.random.default_rng(seed)
-    touched = np.flatnonzero(surface.reachable)
+    touched = surface.inner(max(kind.diameters) / 2.0)  # so that a hand can press all around a lump
     if rng.random() < _NONE or not len(touched) or body.surface is None:
         return ()
     _, slope, _ = body.surface.at(surface.points[touched])

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.experiments.exam_kinds import ExamKind
 from palpate.experiments.exam_lumps import place_of
-from palpate.experiments.exam_score import LumpResult, match_marks
+from palpate.experiments.exam_score import NEAR, LumpResult, match_marks
 from palpate.experiments.examination import Mark
 from palpate.format import millimetres
 from palpate.runtime.touchable import Touchable
@@ -45,7 +45,7 @@ class Practice:
 
     def judge(self, mark: Mark) -> str:
         """Return in words whether a mark has found a lump, and which."""
-        radii = [result.lump.radius + self._radius for result in self._results]
+        radii = [result.lump.radius + NEAR * self._radius for result in self._results]
         pairs = match_marks([result.at for result in self._results], radii, [mark])
         if not pairs:
             nearest = min(float(np.linalg.norm(r.at.above - mark.place)) for r in self._results)

@@ -42,7 +42,7 @@ def score_page(score: ExamScore) -> str:
         f"<h1>{title}</h1>",
         f'<p class="soft">{html.escape(_origin(score))}</p>',
         f'<p class="line"><strong>{html.escape(score.words)}</strong></p>',
-        *(f'<p class="bad">{html.escape(note)}</p>' for note in _notes(score)),
+        *(f'<p class="soft">{html.escape(note)}</p>' for note in _notes(score)),
         "<h2>Map of the body</h2>",
         map_of(score),
         _key(),

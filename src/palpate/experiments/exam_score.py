@@ -26,8 +26,9 @@ from palpate.format import count, duration, millimetres
 from palpate.runtime.touchable import Touchable, load_touchable
 from palpate.surrogates import Lump
 
-__all__ = ["ExamScore", "LumpResult", "match_marks", "score_examination", "share_interval"]
+__all__ = ["NEAR", "ExamScore", "LumpResult", "match_marks", "score_examination", "share_interval"]
 
+NEAR = 0.5  # of the probe's radius, beyond a lump's own, within which a mark finds it
 _NORMAL = 1.959964  # quantile of the normal distribution for an interval of 95 %
 
 
@@ -179,7 +180,7 @@ def _share(results: Iterable[LumpResult]) -> tuple[int, int]:
 def score_examination(past: PastExamination, body: Touchable | None = None) -> ExamScore:
     """Return the score of an examination on this machine.
 
-    A mark finds a lump within the lump's radius and the probe's of the place of the skin above it.
+    A mark finds a lump within the lump's radius and half the probe's of the place of the skin above it.
 
     Parameters
     ----------
@@ -196,7 +197,7 @@ def score_examination(past: PastExamination, body: Touchable | None = None) -> E
     body = load_touchable(past.body) if body is None else body
     marks = standing_marks(past.events)
     places = [place_of(body, lump) for lump in past.lumps]
-    pairs = match_marks(places, [lump.radius + body.radius for lump in past.lumps], marks)
+    pairs = match_marks(places, [lump.radius + NEAR * body.radius for lump in past.lumps], marks)
     limit = float(past.facts["depth_limit"])
     results = tuple(
         LumpResult(lump, at, limit, pairs.get(k))

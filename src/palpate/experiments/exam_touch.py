@@ -31,13 +31,14 @@ __all__ = [
     "read_touch",
 ]
 
-LEVELS = {"lightly": 0.25, "half as deep as can be": 0.5, "deeply": 0.75}
+LEVELS = {"lightly": 0.2, "to the middle": 0.45, "deeply": 0.75}
 """Shares of the deepest trained press from which a place counts as pressed that deep."""
 _CONTACT = 1e-5  # m of depth from which the probe touches
 _SHORTEST = 0.05  # s; contacts that are shorter, or gaps between them, are no press and no end of one
 _EVERY = 0.02  # s between two places that are looked at for the surface
 _STEP = 0.5  # of the probe's radius: two places of the search that are nearer are one
 _AGAIN = 5.0  # s after which the return to a place is a return
+_LEAST_STEPS = 8  # between places of a search: fewer have no order
 _CLEAR = 0.6  # share from which an order has a name
 
 
@@ -96,6 +97,17 @@ class ExamSurface:
         right = right - (right @ normal) * normal
         right /= np.linalg.norm(right)
         return np.array([right, np.cross(normal, right)])
+
+    def inner(self, margin: float) -> np.ndarray:
+        """Return the indices of the reachable points that lie farther than a margin, m, from any that is not."""
+        from scipy.spatial import cKDTree
+
+        reachable = np.flatnonzero(self.reachable)
+        others = self.points[~self.reachable]
+        if not len(others):
+            return reachable
+        away, _ = cKDTree(others).query(self.points[reachable])
+        return reachable[away > margin]
 
     def shares(self, depths: np.ndarray) -> dict[str, float]:
         """Return the share of the reachable area that was pressed to each of `LEVELS`, of depths (N,), m."""
@@ -247,7 +259,7 @@ class SearchOrder:
     @property
     def words(self) -> str:
         """The order by its usual name."""
-        if self.steps < 4:
+        if self.steps < _LEAST_STEPS:
             return "too few places for an order"
         name = "no recognised order"
         if self.parallel >= _CLEAR:

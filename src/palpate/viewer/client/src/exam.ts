@@ -105,10 +105,13 @@ function hear(message: ExamNews): void {
 /** One mark of the list: its number, two answers, and what practice says of it. */
 function entry(mark: ExamMark): HTMLElement {
   const item = document.createElement("li");
-  const head = worded("strong", `mark ${mark.number}`);
-  const remove = button("remove", () => wish({ wish: "remove", number: mark.number }));
-  remove.classList.add("remove");
-  item.append(head, remove);
+  const head = document.createElement("div");
+  head.className = "head";
+  head.append(
+    worded("strong", `mark ${mark.number}`),
+    button("remove", () => wish({ wish: "remove", number: mark.number })),
+  );
+  item.append(head);
   for (const name of ["hardness", "depth"] as const) {
     const group = document.createElement("div");
     group.className = "choice";
@@ -180,7 +183,7 @@ function pin(view: View): void {
 }
 
 function clock(): void {
-  if (news?.stage !== "examination") return;
+  if (news?.stage !== "examination" || socket.readyState !== WebSocket.OPEN) return;
   const seconds = Math.floor(news.elapsed + (performance.now() - heard) / 1000);
   element("exam-time").textContent = `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 }

@@ -11,6 +11,7 @@ import typer
 from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.device_commands import devices_app
+from palpate.cli.exam_command import exam
 from palpate.cli.exchange_commands import card, export_dataset
 from palpate.cli.export_commands import export_app
 from palpate.cli.init_command import init
@@ -334,6 +335,7 @@ def run(
 
 app.command()(replay)
 app.command()(touch)
+app.command()(exam)
 app.command()(fit)
 app.command()(correct)
 app.command()(card)

@@ -99,7 +99,8 @@ class HandEvaluator:
         self._stays: Any = None
         if hasattr(memory, "release"):
             self._stays = MovingRest(elastic, memory, felt[0])
-        self._indentation = memory if hasattr(memory, "now") else None
+        own = getattr(memory, "of_body", memory)
+        self._indentation = own if hasattr(own, "now") else None
         self.indentation = np.zeros(0) if self._indentation is None else self._indentation.now
         self.force: np.ndarray = elastic.force if memory is None else memory.force
         self._node, self._place = node, np.zeros(3)

@@ -225,7 +225,8 @@ class Touchable:
     @property
     def indentation(self) -> Any:
         """The memory of its indentation; None for a body that keeps none."""
-        return self.memory if self.memory is not None and self.memory.keeps_indentation else None
+        memory = None if self.memory is None else self.memory.of_body
+        return memory if memory is not None and memory.keeps_indentation else None
 
     def evaluator(self, *, few: bool = False) -> HandEvaluator:
         """Return the allocation-free evaluator of the 1 kHz path; one for a `few` places waits for no compiler."""

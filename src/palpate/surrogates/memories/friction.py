@@ -22,9 +22,9 @@ The springs are stretched along the plane across it; where that turns, they keep
 in the time t_h: φ̇ = (1 − φ)/t_h − φ |slip|/x_s, the ageing law of Dieterich 1979 and Ruina 1983 with a ceiling.
 
 **Passive.** The springs store V = Σ f²/2k. A spring that stiffens keeps its force, one that softens its stretch, one
-whose limit falls is cut to it, and a spring out of contact is gone: each lowers V at a tool that stays, and what goes is
-lost. While the tool moves, what slips loses |f_j| times its slip. So nothing is had back that was not put in, also
-under a normal force that changes. A force at the end of a step does at least this work on a straight step of any length.
+whose limit falls is cut to it, and a spring out of contact is gone: each lowers V at a tool that stays, and what goes
+is lost. While the tool moves, what slips loses |f_j| times its slip. So nothing is had back that was not put in, also
+under a normal force that changes. On a straight step of any length the force at its end does at least this work.
 
 Turning the tool about its place rubs nothing here, and the springs do not pull in the normal direction.
 """
@@ -41,7 +41,7 @@ import numpy as np
 from palpate import checks
 from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.kernels import kernel
+from palpate.kernels import kernel, part
 from palpate.surrogates.memories.memory import Carry, Memory, MemoryState, register_memory
 from palpate.surrogates.memories.patches import Patches
 
@@ -50,7 +50,9 @@ __all__ = ["MINDLIN", "Friction", "FrictionState", "require_coefficients"]
 MINDLIN = 2.0 / 3.0  # ρ of an incompressible half-space; 1 at a Poisson's ratio of 0
 SPRINGS = 32  # 0.04 % of μF_n off Cattaneo–Mindlin at the full depth, 0.8 % at 3 % of it
 HEALING = 0.1  # s, t_h: friction grows within tenths of a second of rest (Dieterich 1979)
-LAW_PLACE = 11  # place of this memory's own numbers among the arrays of an export, behind those of what is under it
+LAW_PLACE = (
+    11  # place of this memory's own numbers among the arrays of an export, behind those of what is under it
+)
 _UNDER = ("", "relaxation", "indentation")  # by their numbers in an export
 
 
@@ -86,82 +88,103 @@ def _is_sound(position, q, slope, dt) -> bool:  # type: ignore[no-untyped-def]  
     return math.isfinite(total) and q >= 0.0 and dt >= 0.0
 
 
+@part
+def _norm(vector) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Return the length of a vector (3,)."""
+    return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+
+
+@part
+def _contact(q, slope, force, exponent, depths):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Return normal force, N, depth s and Σ w, m, of a contact; zero where there is none."""
+    steep, normal_force, depth, total = _norm(slope), 0.0, 0.0, 0.0
+    for a in range(3):
+        normal_force -= force[a] * slope[a]
+    if steep > 0.0 and normal_force > 0.0:
+        depth = 0.5 * (exponent + 1.0) * q / steep
+        for j in range(depths.size):
+            total += max(depth - depths[j], 0.0)
+    return (normal_force / steep, depth, total) if total > 0.0 else (0.0, 0.0, 0.0)
+
+
+@part
+def _settle(f, slope, old, k, limit) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Take a spring's force (3,) into the plane across the slope and to a new k and limit; return what is lost, J."""
+    across, steep, stored = 0.0, _norm(slope), _norm(f) ** 2 / (2.0 * old)
+    for a in range(3):
+        across += f[a] * slope[a]
+    across /= steep * steep
+    for a in range(3):
+        f[a] -= across * slope[a]
+    size, kept = _norm(f), min(k / old, 1.0)
+    if size * kept > limit:
+        kept = limit / size
+    for a in range(3):
+        f[a] *= kept
+    return stored - (size * kept) ** 2 / (2.0 * k)
+
+
+@part
+def _stretch(f, way, k, limit) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Move a spring's end by a way (3,) in m; return how far it slips, m."""
+    for a in range(3):
+        f[a] -= k * way[a]
+    size = _norm(f)
+    if size <= limit:
+        return 0.0
+    for a in range(3):
+        f[a] *= limit / size
+    return (size - limit) / k
+
+
+@part
+def _refresh(fresh, dt, slipped, law, depth) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Return φ after a time in which the contact has slipped, m; 1 without a contact."""
+    if depth <= 0.0:
+        return 1.0
+    healed = dt / law[4]
+    change = healed
+    if slipped > 0.0 and law[0] > 0.0:
+        change += slipped * law[2] / (law[0] * depth)
+    if change <= 0.0:
+        return float(fresh)
+    return float(healed / change + (fresh - healed / change) * math.exp(-change))
+
+
 @kernel
-def _rub(position, q, slope, dt, force, energies, hold, springs, law, depths) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _rub(position, q, slope, dt, force, energies, hold, springs, law, depths, way) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Move the tool and add the springs' force to `force` (3,), N, which is that without friction.
 
     `energies` gets what the springs store and what is lost in the step, J. `hold` (6,) has whether there was contact,
-    the last place, k and φ; `law` has μ_s, μ_k, ρ, m and t_h.
+    the last place, k and φ; `law` has μ_s, μ_k, ρ, m and t_h; `way` (3,) is scratch.
     """
-    steep, normal_force = 0.0, 0.0
+    normal_force, depth, total = _contact(q, slope, force, law[3], depths)
+    mu, old, slipped, along = law[1] + (law[0] - law[1]) * hold[5], hold[4], 0.0, 0.0
+    k = law[2] * normal_force / total if total > 0.0 else 0.0
     for a in range(3):
-        steep += slope[a] * slope[a]
-        normal_force -= force[a] * slope[a]
-    steep = math.sqrt(steep)
-    total, depth = 0.0, 0.0
-    if steep > 0.0 and normal_force > 0.0:
-        normal_force /= steep
-        depth = 0.5 * (law[3] + 1.0) * q / steep
-        for j in range(depths.size):
-            total += max(depth - depths[j], 0.0)
-    touching, old, lost, stored = total > 0.0, hold[4], 0.0, 0.0
-    k = law[2] * normal_force / total if touching else 0.0
-    mu = law[1] + (law[0] - law[1]) * hold[5]
-    along, slipped = 0.0, 0.0
-    if touching and hold[0] > 0.0:
-        for a in range(3):
-            along += (position[a] - hold[1 + a]) * slope[a]
-        along /= steep * steep
+        way[a] = position[a] - hold[1 + a] if hold[0] > 0.0 and total > 0.0 else 0.0
+        along += way[a] * slope[a]
+    for a in range(3):
+        way[a] -= along * slope[a] / _norm(slope) ** 2 if total > 0.0 else 0.0
+    energies[0] = energies[1] = 0.0
     for j in range(depths.size):
-        before, across, size = 0.0, 0.0, 0.0
-        for a in range(3):
-            before += springs[j, a] * springs[j, a]
-            across += springs[j, a] * slope[a]
-        if before > 0.0:
-            lost += before / (2.0 * old)
-        if not touching or depths[j] >= depth:
-            springs[j, 0] = springs[j, 1] = springs[j, 2] = 0.0
+        f = springs[j]
+        if depth <= depths[j]:
+            energies[1] += _norm(f) ** 2 / (2.0 * old) if old > 0.0 else 0.0
+            f[:] = 0.0
             continue
         limit = mu * normal_force * (depth - depths[j]) / total
-        if before > 0.0:  # into the plane, and to the new stiffness and limit
-            across /= steep * steep
-            for a in range(3):
-                springs[j, a] -= across * slope[a]
-                size += springs[j, a] * springs[j, a]
-            size = math.sqrt(size)
-            kept = min(k / old, 1.0)
-            if size * kept > limit:
-                kept = limit / size
-            for a in range(3):
-                springs[j, a] *= kept
-            lost -= (size * kept) ** 2 / (2.0 * k)
-        if hold[0] > 0.0:
-            size = 0.0
-            for a in range(3):
-                springs[j, a] -= k * (position[a] - hold[1 + a] - along * slope[a])
-                size += springs[j, a] * springs[j, a]
-            size = math.sqrt(size)
-            if size > limit:
-                slip = (size - limit) / k
-                slipped = slip if j == 0 else slipped  # the first spring in is the last to slip
-                lost += limit * slip
-                for a in range(3):
-                    springs[j, a] *= limit / size
-        size = 0.0
+        energies[1] += _settle(f, slope, old, k, limit) if old > 0.0 else 0.0
+        slip = _stretch(f, way, k, limit)
+        energies[1] += limit * slip
+        slipped = slip if j == 0 else slipped  # the first spring in is the last to slip
+        energies[0] += _norm(f) ** 2 / (2.0 * k)
         for a in range(3):
-            force[a] += springs[j, a]
-            size += springs[j, a] * springs[j, a]
-        stored += size / (2.0 * k)
-    hold[0], hold[4] = 1.0 if touching else 0.0, k
+            force[a] += f[a]
+    energies[1] = max(energies[1], 0.0)
+    hold[0], hold[4], hold[5] = 1.0 if total > 0.0 else 0.0, k, _refresh(hold[5], dt, slipped, law, depth)
     for a in range(3):
         hold[1 + a] = position[a]
-    healed = dt / law[4]
-    change = healed + (slipped * law[2] / (law[0] * depth) if slipped > 0.0 and law[0] > 0.0 else 0.0)
-    if not touching:
-        hold[5] = 1.0
-    elif change > 0.0:
-        hold[5] = healed / change + (hold[5] - healed / change) * math.exp(-change)
-    energies[0], energies[1] = stored, max(lost, 0.0)
 
 
 @register_memory
@@ -346,8 +369,8 @@ class FrictionState(MemoryState):
         self.friction = friction
         self.under = None if friction.under is None else friction.under.start()
         self._hold, self._springs = np.zeros(6), np.zeros((len(friction.depths), 3))
-        self._energies = np.zeros(2)
-        self._constants = (friction.law, friction.depths)
+        self._energies, self._way = np.zeros(2), np.zeros(3)
+        self._law, self._depths = friction.law, friction.depths
         self.reset()
         self.step(np.zeros(3), 0.0, np.zeros(3), 0.0)  # compile now, not in the loop
         self.reset()
@@ -368,6 +391,12 @@ class FrictionState(MemoryState):
         self._hold[5] = 1.0
         if self.under is not None:
             self.under.reset()
+
+    def rub(self, kinetic: float) -> None:
+        """Change μ_k, and μ_s in proportion, from the next step on; what is no coefficient is not heard."""
+        if kinetic >= 0.0 and self.friction.kinetic > 0.0 and math.isfinite(kinetic):
+            self._law[0] = self.friction.static * kinetic / self.friction.kinetic
+            self._law[1] = kinetic
 
     def take_over(self, other: FrictionState) -> None:
         """Go on with the springs of another state of as many."""
@@ -390,7 +419,7 @@ class FrictionState(MemoryState):
             stored, lost = under.stored, under.lost_in_step
         _rub(
             position, amplitude, slope, dt, self.force, self._energies, self._hold, self._springs,
-            *self._constants,
+            self._law, self._depths, self._way,
         )  # fmt: skip
         self.book(stored + float(self._energies[0]), lost + float(self._energies[1]))
         return True

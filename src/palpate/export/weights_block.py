@@ -189,6 +189,8 @@ class WeightsBlock:
                 raise _refused("memory", memory.name)
             sources[identifier(memory.name)] = step
             code, size = _code(memory.name, _MEMORIES), memory.c_size()
+            if memory.of_body is not None and not _code(memory.of_body.name, _MEMORIES):
+                code = 0  # under friction, one that the generic core does not hold
             tables |= _numbered(
                 MEMORY, [Table.of(a) for a in memory.c_arguments()], f"memory {memory.name!r}"
             )
@@ -306,7 +308,7 @@ def identifier(name: str) -> str:
 
 
 _BASELINES = ("contact", "pad", "constant", "overlap")
-_MEMORIES = ("relaxation", "indentation", "iwan-elements")
+_MEMORIES = ("relaxation", "indentation", "iwan-elements", "friction")
 
 
 def _code(name: str, known: tuple[str, ...]) -> int:

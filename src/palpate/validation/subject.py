@@ -82,7 +82,8 @@ class Subject:
         line = None if surrogate is None else surrogate.line
         if surrogate is not None and line is not None:
             data = _required(test, surrogate.name)
-            if is_history(data) != (surrogate.memory is not None):
+            remembers = surrogate.memory is not None and surrogate.memory.of_body is not None
+            if is_history(data) != remembers:
                 raise UsageError(
                     f"{surrogate.name} is judged by {'solves' if is_history(data) else 'load histories'}.",
                     why="A body with memory answers to what was done to it before, any other to its loads alone.",

@@ -100,7 +100,9 @@ def run_sitting(
         files.describe(_facts(plan_file, stimuli, loop, part))
         conductor = Conductor(plan, sitting, stimuli, files, loop, part=part)
         hers = SittingPage("participant", conductor.participant_view, conductor.hear, port, token=token)
-        control = SittingPage("control", conductor.control_view, conductor.command, port + 1, token=token)
+        control = SittingPage(
+            "control", conductor.control_view, conductor.command, port and port + 1, token=token
+        )
         for page in (hers, control):
             closing.enter_context(page)
         if on_ready is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -39,8 +40,9 @@ class Outlook:
 
     def __str__(self) -> str:
         lines = [str(self.person)]
-        inside = all(_LOW <= c <= _HIGH for c in (self.person.location_coverage, self.person.spread_coverage))
-        if not inside:
+        chance = 2.0 * math.sqrt(0.05 * 0.95 / self.person.people)  # of a share that is 95 %
+        shares = (self.person.location_coverage, self.person.spread_coverage)
+        if not all(_LOW - chance <= share <= _HIGH + chance for share in shares):
             lines.append(
                 "  these intervals don't hold the truth in 93 to 97 %: see the levels, or give more trials"
             )

@@ -40,7 +40,10 @@ def under_tool(content: dict[str, Any], name: str, tool: PosedTool) -> dict[str,
     known |= {key: acting[key] for key in ("pad", "over") if acting["kind"] == "tool"}
     sweep.pop("symmetric", None)
     if sweep.get("element") is not None:
-        finest = max(COARSE / 4 * tool.shape.size, min(COARSE * tool.shape.size, EDGE_ELEMENT * tool.shape.least_radius))
+        finest = max(
+            COARSE / 4 * tool.shape.size,
+            min(COARSE * tool.shape.size, EDGE_ELEMENT * tool.shape.least_radius),
+        )
         sweep["element"] = float(f"{min(sweep['element'], finest):.4g}")
     body = content["body"]
     surfaces = tuple(surface for surface in body["surfaces"] if surface["name"] != RIM)

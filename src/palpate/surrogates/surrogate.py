@@ -11,7 +11,7 @@ from __future__ import annotations
 import html
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ from palpate.surrogates.fields import (
     surface_fields,
 )
 from palpate.surrogates.learnt_quantities import LearntQuantities
+from palpate.surrogates.learnt_torque import ARM, torque_evaluator, torques
 from palpate.surrogates.lumps import Lump, LumpContrast
 from palpate.surrogates.lumps.lump_units import energy_with_lumps
 from palpate.surrogates.memories import Memory, Patches
@@ -196,6 +197,31 @@ class Surrogate:
                 fix="Ask it for its numbers and fields: `palpate ask FILE --at …`, or surrogate.predict(X).",
             )
         return self.energy
+
+    @property
+    def torque_evaluator(self) -> Callable[..., None] | None:
+        """A new evaluator of the torque on the tool, one place at a time; None of a body that tells none.
+
+        Called with a place (3,), further inputs (p,) and the force (3,) there, it renews its ``torque`` (3,), N m.
+        """
+        return None if self.energy is None else torque_evaluator(self.energy, self.quantities.get(ARM))
+
+    def torque(self, X: np.ndarray) -> np.ndarray:
+        """Return the torque (N, 3) on the tool about its place at inputs X (N, n), N m, in the body's axes.
+
+        Raises
+        ------
+        UsageError
+            If the body tells none: a ball feels no torque about its centre.
+        """
+        evaluator = self.torque_evaluator
+        if evaluator is None:
+            raise UsageError(
+                f"{self.name!r} tells no torque.",
+                why="It was learnt from solves without one, such as those under a ball.",
+                fix="Sweep under a pp.SurfaceTool, and learn from 20 solves or more.",
+            )
+        return torques(self.hand_energy, evaluator, X)
 
     @property
     def _remembers(self) -> str:

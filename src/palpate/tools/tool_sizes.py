@@ -17,7 +17,17 @@ from palpate.tools.round_tools import Capsule, Cone, Fingertip, Sphere
 from palpate.tools.tool_shape import Tool
 from palpate.units import parse_quantity
 
-__all__ = ["BALL", "TURNS", "USUAL", "about", "read_tool", "size_unit", "sizes_of", "suitable_tool", "tool_by_name"]
+__all__ = [
+    "BALL",
+    "TURNS",
+    "USUAL",
+    "about",
+    "read_tool",
+    "size_unit",
+    "sizes_of",
+    "suitable_tool",
+    "tool_by_name",
+]
 
 BALL = "ball"
 """What presses where no tool is named: a `SphereProbe`, whose place is its centre."""
@@ -108,7 +118,8 @@ def read_tool(text: str, radius: float, known: PosedTool | None = None) -> tuple
             raise UsageError(
                 f"A {name} has no size {key!r}.",
                 why=f"It has {', '.join(sizes)}.",
-                fix=did_you_mean(key, tuple(sizes), shown=repr) or f'For example "{name}, {next(iter(sizes))} 6 mm".',
+                fix=did_you_mean(key, tuple(sizes), shown=repr)
+                or f'For example "{name}, {next(iter(sizes))} 6 mm".',
             )
         sizes[key] = parse_quantity(value, size_unit(key), f"The size {key} of the {name}", bare=False)
     return name, tool_by_name(name, sizes)

@@ -57,6 +57,7 @@ class Subject:
     loads: Surrogate | None = None  # networks that answer by load
     body: Surrogate | None = None  # a body with memory
     histories: Dataset | None = None  # unseen, of that body
+    tool: Surrogate | None = None  # a body under a tool, of which it tells the torque
     answering: Surrogate | None = None  # a surrogate that no hand feels, judged by its numbers and fields
     history: History | None = None  # record of the sequential filter
     refined: TouchSolves | None = None  # on a refined mesh
@@ -189,6 +190,7 @@ def _by_place(
         data=solves.data,
         field=field,
         lumps=None if surrogate is None else surrogate.lumps,
+        tool=None if surrogate is None or surrogate.torque_evaluator is None else surrogate,
         refined=None if refined is None else _solves(refined, function, energy),
         strokes=strokes,
         seed=seed,

@@ -15,7 +15,9 @@ DIGITS = 7  # decimals of lengths in m: a tenth of a micrometre
 def drawn_tool(tool: PosedTool, parameters: tuple[Range, ...] = ()) -> DrawnTool:
     """Return a tool as the page draws it; `parameters` are the inputs that a hand does not supply."""
     mesh, turn = tool_mesh(tool.shape), tool.turn
-    points, normals = (mesh.points, mesh.normals) if turn is None else (mesh.points @ turn.T, mesh.normals @ turn.T)
+    points, normals = (
+        (mesh.points, mesh.normals) if turn is None else (mesh.points @ turn.T, mesh.normals @ turn.T)
+    )
     x, y, z = tool.to_centre.tolist()
     names = [parameter.name for parameter in parameters]
     a, b, c = (names.index(name) if name in names else -1 for name in ("tip_rx", "tip_ry", "tip_rz"))

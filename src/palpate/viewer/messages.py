@@ -100,7 +100,11 @@ class Frame(Binary):
     time: Annotated[float, Wire("f64", "s, when the frame was composed, on the loop's clock")]
     echo: Annotated[float, Wire("f64", "ms, page clock: `sent` of the last Hand that this page sent")]
     position: Annotated[
-        Vec3, Wire("vec3", "m, the probe's centre or the tool's place, or the hand's offset from what it holds at rest")
+        Vec3,
+        Wire(
+            "vec3",
+            "m, the probe's centre or the tool's place, or the hand's offset from what it holds at rest",
+        ),
     ]
     force: Annotated[Vec3, Wire("vec3", "N, on the hand")]
     rate: Annotated[float, Wire("f32", "Hz, ticks per second achieved")]

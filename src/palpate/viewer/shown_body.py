@@ -224,7 +224,9 @@ def body_of_dataset(dataset: Any, name: str) -> ShownBody:
     radius, tool = _radius(origin), _tool(origin)
     rest = np.asarray(data["rest"].values, dtype=float)
     steps = [_sample(data, int(row), radius) for row in rows]
-    return ShownBody(name, rest, np.asarray(data["triangles"].values), steps, fixed=_fixed(data, origin), tool=tool)
+    return ShownBody(
+        name, rest, np.asarray(data["triangles"].values), steps, fixed=_fixed(data, origin), tool=tool
+    )
 
 
 def _sample(data: Any, row: int, radius: float | None) -> ShownStep:
@@ -254,7 +256,9 @@ def _fixed(data: Any, origin: Any) -> np.ndarray | None:
 def _tool(origin: Any) -> PosedTool | None:
     """Return the tool of which a record of how a dataset was made tells."""
     acting = origin.get("problem", {}).get("interactions", ())
-    tools = [PosedTool.of(one) for one in acting if isinstance(one, dict) and one.get("type") == "SurfaceTool"]
+    tools = [
+        PosedTool.of(one) for one in acting if isinstance(one, dict) and one.get("type") == "SurfaceTool"
+    ]
     return tools[0] if len(tools) == 1 else None
 
 

@@ -16,7 +16,16 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.format import bound, millimetres, share
 from palpate.tools import PosedTool
-from palpate.tools.tool_sizes import BALL, TURNS, USUAL, about, size_unit, sizes_of, suitable_tool, tool_by_name
+from palpate.tools.tool_sizes import (
+    BALL,
+    TURNS,
+    USUAL,
+    about,
+    size_unit,
+    sizes_of,
+    suitable_tool,
+    tool_by_name,
+)
 from palpate.units import parse_quantity
 from palpate.viewer.messages import Surface
 from palpate.viewer.part_messages import (
@@ -244,7 +253,10 @@ def require_room_for_tool(tool: PosedTool, size: np.ndarray) -> None:
 
 def require_round_edge(tool: PosedTool) -> None:
     """Refuse an edge that is sharper than the elements under a tool become by themselves."""
-    from palpate.physics.interactions.surface_tool import EDGE_ELEMENT, FINEST  # a page of a body needs no physics
+    from palpate.physics.interactions.surface_tool import (
+        EDGE_ELEMENT,
+        FINEST,
+    )  # a page of a body needs no physics
 
     edge, finest = tool.shape.least_radius, FINEST * tool.shape.size
     if finest > EDGE_ELEMENT * edge:
@@ -260,7 +272,9 @@ def _tools(choices: PartChoices) -> tuple[ToolInfo, ...]:
     for name in USUAL:
         own = choices.posed if name == choices.tool else None
         texts = _size_texts(own or suitable_tool(name, choices.radius))
-        sizes = tuple(SizeInfo(key, _title(key).removeprefix("The ").lower(), text) for key, text in texts.items())
+        sizes = tuple(
+            SizeInfo(key, _title(key).removeprefix("The ").lower(), text) for key, text in texts.items()
+        )
         tools.append(ToolInfo(name, about(name), sizes))
     return tuple(tools)
 
@@ -279,9 +293,11 @@ def _title(key: str) -> str:
         return f"The turn about {key[-1]}"
     if key.startswith("size_"):
         return f"The length along {key[-1]}"
-    return {"edge": "The edge's radius", "tip": "The tip's radius", "half_angle": "The angle from axis to side"}.get(
-        key, f"The {key}"
-    )
+    return {
+        "edge": "The edge's radius",
+        "tip": "The tip's radius",
+        "half_angle": "The angle from axis to side",
+    }.get(key, f"The {key}")
 
 
 def error_line(error: UsageError) -> str:

@@ -22,8 +22,8 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
 from palpate.learning.fields import LearntField, Snapshots, learn_snapshots, lumped_mass
-from palpate.learning.learn_arm import learn_arm
 from palpate.learning.kept_surface import touched_overlap, touched_surface
+from palpate.learning.learn_arm import learn_arm
 from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_region
 from palpate.learning.recognised import Recognised, Request, recogniser
 from palpate.options import FieldOptions

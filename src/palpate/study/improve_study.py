@@ -26,8 +26,8 @@ from palpate.study.run import (
     validate_study,
     with_validation,
 )
-from palpate.study.study import Study
 from palpate.study.stage_records import PressSweepRecord
+from palpate.study.study import Study
 from palpate.study.study_advice import earlier_curve
 from palpate.sweeps import local_cluster
 

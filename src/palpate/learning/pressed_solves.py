@@ -23,11 +23,13 @@ from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
 from palpate.learning.fields import LearntField, Snapshots, learn_snapshots, lumped_mass
 from palpate.learning.kept_surface import touched_overlap, touched_surface
+from palpate.learning.learn_arm import learn_arm
 from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_region
 from palpate.learning.recognised import Recognised, Request, recogniser
 from palpate.options import FieldOptions
 from palpate.surrogates import Baseline, ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
 from palpate.surrogates.baselines import OverlapBaseline, ToolBaseline, deepest_ball, depth_series
+from palpate.surrogates.learnt_torque import ARM
 from palpate.tools import PosedTool
 from palpate.units import Range
 
@@ -92,7 +94,16 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
     deepest = {"deepest": pressed.deepest or None}
     # a law that was asked for is taken as it is
     rivals = None if options.get("choose") is False else pressed.overlap_baselines
-    return Recognised(baseline, pressed.solves, deepest | options, learn_field, rivals=rivals, region=region)
+    numbers = {} if pressed.tool is None else {ARM: partial(learn_arm, pressed.data, pressed.inputs)}
+    return Recognised(
+        baseline,
+        pressed.solves,
+        deepest | options,
+        learn_field,
+        rivals=rivals,
+        region=region,
+        numbers=numbers,
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -130,4 +130,26 @@ class RuntimeRecord(Record):
 
     rate: Number = Field(1000.0, ge=10, le=10000, description="Hz")
     max_force: Newtons = Field(12.0, gt=0, description="largest force; the force is limited to this")
+    friction: Number | None = Field(
+        None,
+        ge=0,
+        description="coefficient of friction of the tool that slides on the body; left out: none",
+        examples=[0.3],
+    )
+    static_friction: Number | None = Field(
+        None,
+        ge=0,
+        description="the same of a tool at rest; left out: as that of one that slides",
+        examples=[0.4],
+    )
     port: Count = Field(8080, ge=0, le=65535, description="of the page; a busy port moves on to the next")
+
+    @model_validator(mode="after")
+    def _static_is_larger(self) -> RuntimeRecord:
+        if self.static_friction is not None and (
+            self.friction is None or self.static_friction < self.friction
+        ):
+            raise ValueError(
+                "static_friction is the coefficient of a tool at rest: give it beside friction, and no less than that"
+            )
+        return self

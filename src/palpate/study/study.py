@@ -108,6 +108,8 @@ class Study(Record):
             )
         if fault := acting.fault(body):
             raise ValueError(fault)
+        if self.runtime.friction and not self.presses:
+            raise ValueError("[runtime] friction is of a tool that slides on a body; this one is held")
         remembers = self.memory is not None
         if body.has_memory and not remembers:
             raise ValueError(

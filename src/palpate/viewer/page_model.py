@@ -148,7 +148,7 @@ class PageModel:
 
         `loop` has the fields of `Frame` that tell of the loop and the page, whatever the body.
         """
-        drawn = self._drawing.frame(state, held, parameters)
+        drawn = self._drawing.frame(state, held, parameters[: len(self.body.energy.parameters)])
         felt = {"depth": state.depth, "stiffness": state.stiffness if held else 0.0}
         return Frame(**{"version": self.version, **_NO_TOUCH, **felt, **loop, **drawn})
 

@@ -1,4 +1,4 @@
-// Generated from palpate/viewer/messages.py and part_messages.py; change it there, then
+// Generated from palpate/viewer/messages.py, part_messages.py and exam_messages.py; change it there, then
 //   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 
 import { decode, encode } from "./wire";
@@ -100,6 +100,23 @@ export interface ToolInfo {
   name: string;
   about: string;
   sizes: SizeInfo[];
+}
+
+/** A place that a person has marked on the skin, m, or one that practice shows. */
+export interface ExamMark {
+  number: number;
+  place: Vec3;
+  hardness: string;
+  depth: string;
+  answer: string;
+}
+
+/** An examination on this machine. */
+export interface FormerExam {
+  name: string;
+  at: string;
+  words: string;
+  ended: boolean;
 }
 
 /** A touchable body and its loop, once per connection, server to page. */
@@ -249,6 +266,30 @@ export interface LearningProgress {
   trained_area: number | null;
 }
 
+/** The state of the page of an examination, server to page. */
+export interface ExamNews {
+  protocol: number;
+  title: string;
+  words: string;
+  stage: string;
+  notice: string;
+  elapsed: number;
+  marks: ExamMark[];
+  lumps: ExamMark[];
+  former: FormerExam[];
+  score: string;
+}
+
+/** The wish of a person who examines, page to server. */
+export interface ExamWish {
+  wish: string;
+  number: number;
+  place: Vec3;
+  hardness: string;
+  depth: string;
+  name: string;
+}
+
 export function isHello(message: { kind: string }): message is Hello & { kind: string } {
   return message.kind === "Hello";
 }
@@ -299,6 +340,14 @@ export function isAnswer(message: { kind: string }): message is Answer & { kind:
 
 export function isLearningProgress(message: { kind: string }): message is LearningProgress & { kind: string } {
   return message.kind === "LearningProgress";
+}
+
+export function isExamNews(message: { kind: string }): message is ExamNews & { kind: string } {
+  return message.kind === "ExamNews";
+}
+
+export function isExamWish(message: { kind: string }): message is ExamWish & { kind: string } {
+  return message.kind === "ExamWish";
 }
 
 export const FRAME = 1;

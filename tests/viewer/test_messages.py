@@ -66,6 +66,7 @@ HELLO = Hello(
     radius=0.005,
     radius_parameter=-1,
     tool=None,
+    twists=False,
     deepest=0.7,
     force_max=5.0,
     stiffness_max=24.0,

@@ -138,6 +138,8 @@ def _with_tool(study: Study, options: PartOptions) -> Study:
     require_room_for_tool(tool, high - low)
     require_round_edge(tool)
     content = under_tool(study.model_dump(), name, tool)
+    if options.element not in (None, AUTO):  # as somebody wants it
+        content["sweep"]["element"] = parse_quantity(options.element, "m", "--element", bare=False)
     if options.depth is None:
         deepest = tool_depth(tool.shape, ball.depth[1])
         content["interaction"]["depth"] = (_nice(LEAST_DEPTH * deepest), deepest)

@@ -125,6 +125,7 @@ class PageModel:
             radius=body.radius,
             radius_parameter=-1 if body.radius_parameter is None else body.radius_parameter,
             tool=None if body.tool is None else drawn_tool(body.tool, body.parameters),
+            twists=body.tells_torque,
             deepest=body.deepest,
             force_max=body.force_max,
             stiffness_max=body.stiffness_max,

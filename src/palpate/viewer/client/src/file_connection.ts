@@ -25,6 +25,7 @@ export class FileConnection {
   private hand: Hand | null = null;
   private place: Vec3;
   private force: Vec3 = NOWHERE;
+  private torque: Vec3 = NOWHERE; // of the last answer, on a tool
   private answer: Answer | null = null;
   private parameters: Float32Array;
   private tick = 0;
@@ -102,6 +103,7 @@ export class FileConnection {
       const between = to.map((v, i) => from[i]! + ((v - from[i]!) * k) / count) as Vec3;
       this.answer = this.evaluator.step(between, this.parameters, elapsed / count);
     }
+    if (this.hello.twists) this.torque = this.evaluator.torque();
     this.place = to;
     this.rest?.led(to);
     const size = Math.hypot(...this.answer!.force);
@@ -177,6 +179,7 @@ export class FileConnection {
       echo: this.hand?.sent ?? 0,
       position: this.place,
       force: this.force,
+      torque: held ? this.torque : NOWHERE,
       rate: hello.rate, // there is no loop that could be late
       lateness: 0,
       lateness_p50: 0,

@@ -130,6 +130,7 @@ export interface Hello {
   radius: number;
   radius_parameter: number;
   tool: DrawnTool | null;
+  twists: boolean;
   deepest: number;
   force_max: number;
   stiffness_max: number;
@@ -366,6 +367,8 @@ export interface Frame {
   position: Vec3;
   /** N, on the hand */
   force: Vec3;
+  /** N m, on a tool about its place; zero where none is told */
+  torque: Vec3;
   /** Hz, ticks per second achieved */
   rate: number;
   /** s, the latest tick since the frame before, to a quarter of itself */
@@ -427,6 +430,7 @@ const FRAME_LAYOUT: Layout = [
   ["echo", "f64"],
   ["position", "vec3"],
   ["force", "vec3"],
+  ["torque", "vec3"],
   ["rate", "f32"],
   ["lateness", "f32"],
   ["lateness_p50", "f32"],

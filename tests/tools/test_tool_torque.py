@@ -12,7 +12,11 @@ import pressed
 import tooled
 from palpate.errors import UsageError
 from palpate.export import export_c
+from palpate.export.c_export import block_of
+from palpate.export.check_engine import CheckEngine, engine_library
+from palpate.export.fmu_export import export_fmu
 from palpate.export.lib_export import export_lib
+from palpate.export.wasm_core import WasmCore
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.learnt_torque import TurnEvaluator, left_jacobian, torque_of_slopes
 from palpate.tools import PosedTool, Sphere
@@ -122,3 +126,20 @@ def test_a_learnt_arm_of_a_sphere_leads_to_its_centre():
     size = np.linalg.norm(F, axis=1) * pressed.RADIUS
     assert (np.linalg.norm(about_centre, axis=1) < 1e-3 * size).all()
     assert math.isclose(float(np.abs(arm.predict(unseen)[:, 2]).max()), 0.0, abs_tol=1e-12)  # none about its axis
+
+
+def test_the_core_of_pages_and_engines_tells_the_torque(body):
+    block, X = block_of(body, field=None, with_field=False, deviation=False), pressed.places(50)
+    np.testing.assert_allclose(WasmCore.of(block).torques(X), body.torque(X), rtol=1e-9, atol=1e-15)
+    library = engine_library()
+    if library is not None:
+        with CheckEngine(library, block.to_bytes()) as engine:
+            np.testing.assert_allclose(engine.torques(X), body.torque(X), rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_a_tool_leaves_as_an_fmu_with_its_torque(body, tmp_path, version):
+    done = export_fmu(body, tmp_path / "tool.fmu", fmi=version)
+    assert done.comparison is not None
+    assert done.comparison.passed
+    assert done.comparison.parts["torque"].relative < 1e-9

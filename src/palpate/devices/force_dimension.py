@@ -172,7 +172,9 @@ class ForceDimensionDevice(Driver):
         self.closed = True
         with contextlib.suppress(DeviceError):  # a device that is gone pushes no more
             numbers = 6 if self.traits.max_torque > 0.0 else 3
-            self._dhd.call("dhdSetForceAndTorque" if numbers == 6 else "dhdSetForce", *[0.0] * numbers, self._id)
+            self._dhd.call(
+                "dhdSetForceAndTorque" if numbers == 6 else "dhdSetForce", *[0.0] * numbers, self._id
+            )
         for last in ("dhdStop", "dhdClose"):
             with contextlib.suppress(DeviceError):
                 self._dhd.call(last, self._id)
@@ -287,7 +289,12 @@ class ForceDimensionDevice(Driver):
     def _find_wrist(self) -> dict[str, Any]:
         """Find out whether the handle tells its orientation, and whether motors turn it; take what reads and turns it."""
         dhd, device = self._dhd, self._id
-        needed = ("dhdHasWrist", "dhdHasActiveWrist", "dhdGetPositionAndOrientationFrame", "dhdSetForceAndTorque")
+        needed = (
+            "dhdHasWrist",
+            "dhdHasActiveWrist",
+            "dhdGetPositionAndOrientationFrame",
+            "dhdSetForceAndTorque",
+        )
         if not all(dhd.has(name) for name in needed) or not dhd.dhdHasWrist(device):
             return {}
         self._frame = (c_double * 9)()

@@ -55,7 +55,9 @@ _GOODBYE = 0.1  # s for the last frame
 _BUTTONS = 4
 _MM = 1e-3
 _ALL_AXES = 6  # of a handle whose turn is told, or which is turned
-_TORQUE = 0.048  # N m, what the weakest axis of a Phantom Premium 6DOF renders for long (its maker's data sheet)
+_TORQUE = (
+    0.048  # N m, what the weakest axis of a Phantom Premium 6DOF renders for long (its maker's data sheet)
+)
 
 
 @dataclass(frozen=True)

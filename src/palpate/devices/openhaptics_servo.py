@@ -230,7 +230,14 @@ def _called(data):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     doubles, booleans = np.int64(box[DOUBLES]), np.int64(box[BOOLEANS])
     written = box[WRITTEN]
     _frame(np.int64(box[BEGIN]), device)
-    x, y, z, a, b, c = box[FORCE], box[FORCE + 1], box[FORCE + 2], box[FORCE + 3], box[FORCE + 4], box[FORCE + 5]
+    x, y, z, a, b, c = (
+        box[FORCE],
+        box[FORCE + 1],
+        box[FORCE + 2],
+        box[FORCE + 3],
+        box[FORCE + 4],
+        box[FORCE + 5],
+    )
     _transfer(doubles, np.uint32(_POSITION), base + 8 * (slot + PLACE))
     if box[ORIENTS] != 0.0:
         _transfer(doubles, np.uint32(_TRANSFORM), base + 8 * (slot + TURN))

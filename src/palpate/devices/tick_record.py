@@ -38,7 +38,11 @@ TICK = np.dtype(
         ("tick", "i8"),
         ("time", "f8"),  # s, of the loop's clock, when the tick began
         ("sample_position", "f8", 3),  # m, device axes, as the driver gave it
-        ("sample_orientation", "f8", 4),  # quaternion w, x, y, z, device axes; zero of a device that tells none
+        (
+            "sample_orientation",
+            "f8",
+            4,
+        ),  # quaternion w, x, y, z, device axes; zero of a device that tells none
         ("sample_time", "f8"),  # s
         ("patience", "f8"),  # s
         ("hand", "f8", 3),  # m, x right, y up, z towards the user

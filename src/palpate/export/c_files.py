@@ -85,7 +85,13 @@ def c_files(
         outputs, title = answers.outputs, str(answers)
     else:
         felt, title = len(surrogate.hand_energy.baseline.directions), title.splitlines()[0]
-        has = {"BODY": True, "TORQUE": ARM_NET in block.tables, "MEMORY": block.memory, "RELEASE": block.releases, "FIELD": block.field}
+        has = {
+            "BODY": True,
+            "TORQUE": ARM_NET in block.tables,
+            "MEMORY": block.memory,
+            "RELEASE": block.releases,
+            "FIELD": block.field,
+        }
         parts = [part for part, there in has.items() if there]
     facts = _Facts(name, single, block, title, surrogate.inputs, outputs, felt)
     words = _words(facts, surrogate)

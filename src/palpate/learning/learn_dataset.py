@@ -26,6 +26,7 @@ from palpate.learning.dataset_answers import DatasetAnswers
 from palpate.learning.energy import EnergyHistory, SuspectSolve, learn_energy
 from palpate.learning.fields import LearntField, LearntModes, learn_modes
 from palpate.learning.learning_history import History
+from palpate.learning.lumps import LumpPresses, learn_lumps
 from palpate.learning.plastic import MemoryFit
 from palpate.learning.recognised import Recognised, Request, recognise
 from palpate.learning.search import Budget
@@ -227,8 +228,9 @@ def learn(
     memory, fit = (None, None) if known.memory is None else known.memory(energy)
     if memory is not None:
         del meta["solves"]  # a history is none
+    lumps = learn_lumps(LumpPresses.of(train), log) if "lump_energy" in train else None
     drawn = {**known.fields, **{k: v.field for k, v in learnt.items()}}
-    surrogate = Surrogate(energy, drawn, memory, meta, _quantities(beside))
+    surrogate = Surrogate(energy, drawn, memory, meta, _quantities(beside), lumps=lumps)
     spent = time.monotonic() - began
     return surrogate, LearningHistory(
         found, solves, spent, learnt, known.filter, quantities=beside, memory=fit

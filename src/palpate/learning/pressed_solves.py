@@ -22,8 +22,8 @@ from palpate.errors import UsageError
 from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
 from palpate.learning.fields import LearntField, Snapshots, learn_snapshots, lumped_mass
-from palpate.learning.learn_arm import learn_arm
 from palpate.learning.kept_surface import touched_overlap, touched_surface
+from palpate.learning.learn_arm import learn_arm
 from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_region
 from palpate.learning.recognised import Recognised, Request, recogniser
 from palpate.options import FieldOptions
@@ -81,6 +81,7 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
             radius_input=pressed.radius_input,
             options=field,
             drawn=pressed.drawn,
+            shift=pressed.shift,
         )
 
     own, options = request.split("law", "length", "deviation")
@@ -130,6 +131,7 @@ class PressedSolves:
         None  # the body's own surface, of a file; its triangles are then in four parts
     )
     tool: str | None = None  # description of a tool as JSON; None of a sphere
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # way from the place to the ball's centre, m
 
     @classmethod
     def of(cls, data: Dataset, layout: Layout | None = None) -> PressedSolves:
@@ -181,6 +183,7 @@ class PressedSolves:
             None if rim is None else (rest[triangles[touched]], rest[triangles[~touched]]),
             drawn,
             None if tool is None else json.dumps(tool.describe(), sort_keys=True),
+            (float(shift[0]), float(shift[1]), float(shift[2])),
         )
 
     @property

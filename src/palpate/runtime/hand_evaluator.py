@@ -64,8 +64,9 @@ class HandEvaluator:
     unit vectors, x, y and z unless given; `normal` (3,) is the outer normal of the surface where a probe usually
     touches; `inner` is how far inside it the probe's centre may go, m, infinite for a body that never lets go; `radius`
     is the probe's, m, unless it is the further input of number `radius_input`; `places` are those further inputs that a
-    hand which holds can't change: they say where it has taken hold. One for a `few` places interprets kernels. Of a tool
-    that tells its torque, `torque_at` is as `palpate.surrogates.Surrogate.torque_evaluator` gives it.
+    hand which holds can't change: they say where it has taken hold. `further` is the number of further inputs of a body
+    under a tool with friction; one more after them is its coefficient. One for a `few` places interprets kernels. Of a
+    tool that tells its torque, `torque_at` is as `palpate.surrogates.Surrogate.torque_evaluator` gives it.
 
     Its answer: `force` (3,), N, on the hand; `torque` (3,), N m, on the tool about its place, zero where none is told; `contact` (3,), m, the probe's centre or the offset of the held place from
     its rest; `loads` (n,), the inputs of the field at its nodes there, such as loads, N; `inside` the trained region or
@@ -94,6 +95,7 @@ class HandEvaluator:
         radius_input: int | None = None,
         node: Any = None,
         places: tuple[int, ...] = (),
+        further: int | None = None,
         torque_at: Any = None,
         few: bool = False,
     ) -> None:
@@ -104,11 +106,13 @@ class HandEvaluator:
         self._normal = np.array([0.0, 0.0, 1.0]) if normal is None else normal
         self._inner, self._radius, self._radius_input = inner, radius, radius_input
         self._places, self._taken = places, np.zeros(0)
+        self._further = further if hasattr(memory, "rub") else None
         felt = np.eye(3) if directions is None else np.ascontiguousarray(directions, dtype=np.float64)
         self._stays: Any = None
         if hasattr(memory, "release"):
             self._stays = MovingRest(elastic, memory, felt[0])
-        self._indentation = memory if hasattr(memory, "now") else None
+        own = getattr(memory, "of_body", memory)
+        self._indentation = own if hasattr(own, "now") else None
         self.indentation = np.zeros(0) if self._indentation is None else self._indentation.now
         self.force: np.ndarray = elastic.force if memory is None else memory.force
         self._node, self._place = node, np.zeros(3)
@@ -197,6 +201,9 @@ class HandEvaluator:
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
         """Renew the attributes for a probe or a held place at `position` (3,), m, and the further inputs (p,)."""
         elastic, memory = self._elastic, self._memory
+        if self._further is not None and len(parameters) > self._further:
+            memory.rub(float(parameters[self._further]))
+            parameters = parameters[: self._further]
         if self._places:
             parameters = self._where_taken(parameters)
         if self._stays is not None and not self._held:

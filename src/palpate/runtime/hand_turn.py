@@ -26,6 +26,8 @@ from palpate.devices.device import Axes
 from palpate.runtime.oscillation import OscillationWatch
 from palpate.runtime.passivity import PassivityController
 from palpate.runtime.safety import Limits, Safety
+from palpate.surrogates.learnt_torque import TURNS
+from palpate.tools.rotations import rotation_matrix
 from palpate.units import Range
 
 __all__ = ["HandTurn", "TorqueOnHand", "rotation_of"]
@@ -36,8 +38,9 @@ _FASTEST = 50.0  # rad/s: no wrist turns faster, and no two samples of hardware 
 _SHORTEST = 1e-3  # s between two samples
 _STILL = [0.0, 0.0, 0.0]
 _PATIENCE = 3  # impossible orientations in a row that are a fault
-_UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # hand's axes to those of a body with z up
-_TURNS = ("tip_rx", "tip_ry", "tip_rz")
+_UPRIGHT = np.array(
+    [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+)  # hand's axes to those of a body with z up
 
 
 def rotation_of(quaternion: np.ndarray, matrix: np.ndarray) -> bool:
@@ -47,9 +50,21 @@ def rotation_of(quaternion: np.ndarray, matrix: np.ndarray) -> bool:
     if not abs(size - 1.0) <= 2.0 * _NORM:  # not-a-number neither
         return False
     s = 2.0 / size
-    matrix[0, 0], matrix[0, 1], matrix[0, 2] = 1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)
-    matrix[1, 0], matrix[1, 1], matrix[1, 2] = s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)
-    matrix[2, 0], matrix[2, 1], matrix[2, 2] = s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)
+    matrix[0, 0], matrix[0, 1], matrix[0, 2] = (
+        1.0 - s * (y * y + z * z),
+        s * (x * y - w * z),
+        s * (x * z + w * y),
+    )
+    matrix[1, 0], matrix[1, 1], matrix[1, 2] = (
+        s * (x * y + w * z),
+        1.0 - s * (x * x + z * z),
+        s * (y * z - w * x),
+    )
+    matrix[2, 0], matrix[2, 1], matrix[2, 2] = (
+        s * (x * z - w * y),
+        s * (y * z + w * x),
+        1.0 - s * (x * x + y * y),
+    )
     return True
 
 
@@ -67,7 +82,7 @@ class HandTurn:
         self._to_body = np.ascontiguousarray(_UPRIGHT @ turn if upright else turn)
         self._hand, self._new, self._held = np.eye(3), np.eye(3), False
         names = [r.name for r in parameters]
-        self._inputs = [(names.index(name), k) for k, name in enumerate(_TURNS) if name in names]
+        self._inputs = [(names.index(name), k) for k, name in enumerate(TURNS) if name in names]
         self._ranges = [(parameters[i].low, parameters[i].high) for i, _ in self._inputs]
         self._axis = axis
 
@@ -101,7 +116,7 @@ class HandTurn:
             w = [0.0, 0.0, 0.0]
             for number, k in self._inputs:
                 w[k] = float(parameters[number])
-            self.tool = _exponential(w)
+            self.tool = rotation_matrix(np.array(w))
             return
         w = _logarithm(self.tool) if len(self._inputs) == 3 else _swing(self._axis, self.tool @ self._axis)
         for (number, k), (low, high) in zip(self._inputs, self._ranges, strict=True):
@@ -174,23 +189,15 @@ def _logarithm(R: np.ndarray) -> list[float]:
     return [factor * x, factor * y, factor * z]
 
 
-def _exponential(w: Sequence[float]) -> np.ndarray:
-    """Return the rotation (3, 3) of a rotation vector in rad, by Rodrigues' formula."""
-    angle = math.hypot(*w)
-    if angle == 0.0:
-        return np.eye(3)
-    a, b, c = (value / angle for value in w)
-    K = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K)
-
-
 def _swing(before: np.ndarray, after: np.ndarray) -> list[float]:
     """Return the rotation vector in the x–y plane that turns one unit vector (3,) into another, rad."""
     dx, dy, _ = (after - before).tolist()
     size = math.hypot(dx, dy)
     if size < 1e-12:
         return [0.0, 0.0, 0.0]
-    n = np.array([-dy / size, dx / size, 0.0])  # at right angles to the change, so both have the same part along it
+    n = np.array(
+        [-dy / size, dx / size, 0.0]
+    )  # at right angles to the change, so both have the same part along it
     across = before - (n @ before) * n
     angle = math.atan2(float(n @ np.cross(across, after)), float(across @ after))
     return [angle * float(n[0]), angle * float(n[1]), 0.0]

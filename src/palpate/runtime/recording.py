@@ -35,7 +35,18 @@ if TYPE_CHECKING:
 
 __all__ = ["RecordedDevice", "Ring", "TickRecorder"]
 
-_AS_PUBLISHED = ("tick", "hand", "position", "contact", "force", "torque", "depth", "stiffness", "delay", "coupling")
+_AS_PUBLISHED = (
+    "tick",
+    "hand",
+    "position",
+    "contact",
+    "force",
+    "torque",
+    "depth",
+    "stiffness",
+    "delay",
+    "coupling",
+)
 
 _SECONDS, _LEAST = 4.0, 4096  # s of ticks that the ring holds, and ticks at the least
 _FASTEST = 10_000.0  # Hz; a loop at a higher rate is refused, and needs no room before that

@@ -54,6 +54,7 @@ def loop_facts(model: Touchable, loop: Loop, limits: Limits) -> dict[str, Any]:
         "name": model.name,
         "holds": model.holds,
         "parameters": [r.name for r in model.parameters],
+        "friction": _coefficients(model),
         "inputs": [[r.name, r.low, r.high, r.unit] for r in model.inputs],
         "rate": loop.bounds.rate,
         "body_stiffness": loop.coupling.hardest,
@@ -138,6 +139,8 @@ class Replay:
             raise UsageError(f"{trace.path.name} holds no tick.", why=" ".join(trace.notes))
         header = trace.header
         _require_loop(trace, model)
+        if same:
+            model = _rubbed(model, header)
         self.trace, self.model, self.same = trace, model, same
         traits = header["traits"]
         known = Traits(**traits | {"axes": _axes(traits["axes"])})
@@ -191,6 +194,7 @@ class Replay:
                     f"{name} answers from tick {event.get('loop_tick')} on, and is not there"
                 )
                 continue
+            new = _rubbed(new, self.trace.header)
             stiffness = new.stiffness_max if self.loop.motors else 0.0
             swap = swap_between(body, new, seconds=float(event["seconds"]), stiffness=stiffness)
             self._swaps.append((int(event["loop_tick"]), swap))
@@ -369,6 +373,19 @@ def _recorded_successor(trace: Trace, event: Mapping[str, Any]) -> Touchable | N
         if place.is_file() and model_facts(place)["sha256"] == known.get("sha256"):
             return load_touchable(place)
     return None
+
+
+def _coefficients(model: Touchable) -> list[float] | None:
+    """Return μ_k and μ_s of the tool on a body, zero without friction; None of one that is held."""
+    law = model.friction
+    if model.holds:
+        return None
+    return [0.0, 0.0] if law is None else [law.kinetic, law.static]
+
+
+def _rubbed(model: Touchable, header: Mapping[str, Any]) -> Touchable:
+    """Return a recorded body with the friction that its loop was asked for."""
+    return model if header.get("friction") is None else model.with_friction(*header["friction"])
 
 
 def _axes(rows: Any) -> Any:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from palpate.validation.figures.answer_errors import answer_errors
 from palpate.validation.figures.by_load import network_outputs, shape_by_load, stiffness_by_load, work_by_load
+from palpate.validation.figures.contrast_error import contrast_error
 from palpate.validation.figures.coverage import coverage
 from palpate.validation.figures.displayed_shape import displayed_shape
 from palpate.validation.figures.figure import Figure
@@ -36,6 +37,7 @@ FIGURES: tuple[tuple[str, Callable[[Subject], Figure | str | None]], ...] = (
     ("stiffness", stiffness_by_load),
     ("smoothness", stroke_smoothness),
     ("coverage", coverage),
+    ("contrast", contrast_error),
     ("loops", closed_path_work),
     ("loops", work_by_load),
     ("border_loops", border_work),

@@ -27,7 +27,7 @@ from palpate.runtime.oscillation import OscillationWatch
 from palpate.runtime.passivity import PassivityController
 from palpate.runtime.safety import Limits, Safety
 from palpate.surrogates.learnt_torque import TURNS
-from palpate.tools.rotations import rotation_matrix
+from palpate.tools.rotations import rotation_matrix, rotation_vector, swing_vector
 from palpate.units import Range
 
 __all__ = ["HandTurn", "TorqueOnHand", "rotation_of"]
@@ -93,7 +93,7 @@ class HandTurn:
         whole = rotation_of(quaternion, self._new)
         new = P @ self._new @ P.T if whole else self._hand
         change = new @ self._hand.T
-        step = _logarithm(change)
+        step = rotation_vector(change)
         if not whole or (self._held and math.hypot(*step) > _FASTEST * max(self._since, _SHORTEST)):
             self._doubts += 1
             self.fault = self._doubts >= _PATIENCE
@@ -118,7 +118,7 @@ class HandTurn:
                 w[k] = float(parameters[number])
             self.tool = rotation_matrix(np.array(w))
             return
-        w = _logarithm(self.tool) if len(self._inputs) == 3 else _swing(self._axis, self.tool @ self._axis)
+        w = rotation_vector(self.tool) if len(self._inputs) == 3 else swing_vector(self._axis, self.tool @ self._axis)
         for (number, k), (low, high) in zip(self._inputs, self._ranges, strict=True):
             parameters[number] = min(max(w[k], low), high)
 
@@ -178,26 +178,3 @@ class TorqueOnHand:
         self._safety.stop()
         self.passivity.interrupt()
         self._watch.reset()
-
-
-def _logarithm(R: np.ndarray) -> list[float]:
-    """Return the rotation vector of a rotation (3, 3), rad, of an angle below π."""
-    x, y, z = float(R[2, 1] - R[1, 2]), float(R[0, 2] - R[2, 0]), float(R[1, 0] - R[0, 1])
-    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-    cosine = 0.5 * (float(R[0, 0] + R[1, 1] + R[2, 2]) - 1.0)
-    factor = 0.5 if sine < 1e-8 else 0.5 * math.atan2(sine, cosine) / sine
-    return [factor * x, factor * y, factor * z]
-
-
-def _swing(before: np.ndarray, after: np.ndarray) -> list[float]:
-    """Return the rotation vector in the x–y plane that turns one unit vector (3,) into another, rad."""
-    dx, dy, _ = (after - before).tolist()
-    size = math.hypot(dx, dy)
-    if size < 1e-12:
-        return [0.0, 0.0, 0.0]
-    n = np.array(
-        [-dy / size, dx / size, 0.0]
-    )  # at right angles to the change, so both have the same part along it
-    across = before - (n @ before) * n
-    angle = math.atan2(float(n @ np.cross(across, after)), float(across @ after))
-    return [angle * float(n[0]), angle * float(n[1]), 0.0]

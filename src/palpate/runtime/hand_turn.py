@@ -26,6 +26,8 @@ from palpate.devices.device import Axes
 from palpate.runtime.oscillation import OscillationWatch
 from palpate.runtime.passivity import PassivityController
 from palpate.runtime.safety import Limits, Safety
+from palpate.surrogates.learnt_torque import TURNS
+from palpate.tools.rotations import rotation_matrix, rotation_vector, swing_vector
 from palpate.units import Range
 
 __all__ = ["HandTurn", "TorqueOnHand", "rotation_of"]
@@ -39,7 +41,6 @@ _PATIENCE = 3  # impossible orientations in a row that are a fault
 _UPRIGHT = np.array(
     [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
 )  # hand's axes to those of a body with z up
-_TURNS = ("tip_rx", "tip_ry", "tip_rz")
 
 
 def rotation_of(quaternion: np.ndarray, matrix: np.ndarray) -> bool:
@@ -81,7 +82,7 @@ class HandTurn:
         self._to_body = np.ascontiguousarray(_UPRIGHT @ turn if upright else turn)
         self._hand, self._new, self._held = np.eye(3), np.eye(3), False
         names = [r.name for r in parameters]
-        self._inputs = [(names.index(name), k) for k, name in enumerate(_TURNS) if name in names]
+        self._inputs = [(names.index(name), k) for k, name in enumerate(TURNS) if name in names]
         self._ranges = [(parameters[i].low, parameters[i].high) for i, _ in self._inputs]
         self._axis = axis
 
@@ -92,7 +93,7 @@ class HandTurn:
         whole = rotation_of(quaternion, self._new)
         new = P @ self._new @ P.T if whole else self._hand
         change = new @ self._hand.T
-        step = _logarithm(change)
+        step = rotation_vector(change)
         if not whole or (self._held and math.hypot(*step) > _FASTEST * max(self._since, _SHORTEST)):
             self._doubts += 1
             self.fault = self._doubts >= _PATIENCE
@@ -115,9 +116,9 @@ class HandTurn:
             w = [0.0, 0.0, 0.0]
             for number, k in self._inputs:
                 w[k] = float(parameters[number])
-            self.tool = _exponential(w)
+            self.tool = rotation_matrix(np.array(w))
             return
-        w = _logarithm(self.tool) if len(self._inputs) == 3 else _swing(self._axis, self.tool @ self._axis)
+        w = rotation_vector(self.tool) if len(self._inputs) == 3 else swing_vector(self._axis, self.tool @ self._axis)
         for (number, k), (low, high) in zip(self._inputs, self._ranges, strict=True):
             parameters[number] = min(max(w[k], low), high)
 
@@ -177,36 +178,3 @@ class TorqueOnHand:
         self._safety.stop()
         self.passivity.interrupt()
         self._watch.reset()
-
-
-def _logarithm(R: np.ndarray) -> list[float]:
-    """Return the rotation vector of a rotation (3, 3), rad, of an angle below π."""
-    x, y, z = float(R[2, 1] - R[1, 2]), float(R[0, 2] - R[2, 0]), float(R[1, 0] - R[0, 1])
-    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-    cosine = 0.5 * (float(R[0, 0] + R[1, 1] + R[2, 2]) - 1.0)
-    factor = 0.5 if sine < 1e-8 else 0.5 * math.atan2(sine, cosine) / sine
-    return [factor * x, factor * y, factor * z]
-
-
-def _exponential(w: Sequence[float]) -> np.ndarray:
-    """Return the rotation (3, 3) of a rotation vector in rad, by Rodrigues' formula."""
-    angle = math.hypot(*w)
-    if angle == 0.0:
-        return np.eye(3)
-    a, b, c = (value / angle for value in w)
-    K = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K)
-
-
-def _swing(before: np.ndarray, after: np.ndarray) -> list[float]:
-    """Return the rotation vector in the x–y plane that turns one unit vector (3,) into another, rad."""
-    dx, dy, _ = (after - before).tolist()
-    size = math.hypot(dx, dy)
-    if size < 1e-12:
-        return [0.0, 0.0, 0.0]
-    n = np.array(
-        [-dy / size, dx / size, 0.0]
-    )  # at right angles to the change, so both have the same part along it
-    across = before - (n @ before) * n
-    angle = math.atan2(float(n @ np.cross(across, after)), float(across @ after))
-    return [angle * float(n[0]), angle * float(n[1]), 0.0]

@@ -20,6 +20,7 @@ import numpy as np
 from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.learnt_quantities import LearntQuantities
+from palpate.tools.rotations import left_jacobian, rotation_matrix
 from palpate.units import Range, bounds
 
 __all__ = [
@@ -27,7 +28,6 @@ __all__ = [
     "TURNS",
     "TorqueEvaluator",
     "TurnEvaluator",
-    "left_jacobian",
     "torque_evaluator",
     "torque_of_slopes",
     "torques",
@@ -45,19 +45,6 @@ def turn_inputs(inputs: Sequence[Range]) -> tuple[int, ...]:
     """Return the numbers of the inputs that turn a tool, of tip_rx, tip_ry and tip_rz those that are there."""
     names = [r.name for r in inputs]
     return tuple(names.index(name) for name in TURNS if name in names)
-
-
-def left_jacobian(w: np.ndarray) -> np.ndarray:
-    """Return J (3, 3) of a rotation vector w (3,) in rad: exp(w + δw) = exp(J δw) exp(w)."""
-    angle = float(np.linalg.norm(w))
-    a, b, c = w.tolist()
-    K = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-    if angle < 1e-4:  # the next terms are of the fourth order
-        first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
-    else:
-        first = (1.0 - math.cos(angle)) / angle**2
-        second = (angle - math.sin(angle)) / angle**3
-    return np.asarray(np.eye(3) + first * K + second * K @ K)
 
 
 def torques(energy: LearntEnergy, evaluator: Any, X: np.ndarray) -> np.ndarray:
@@ -135,10 +122,7 @@ def torque_of_slopes(slope: np.ndarray, w: np.ndarray, axes: Sequence[int], down
     J = left_jacobian(w)
     rows, known = J.T[list(axes)], slope[list(axes)]
     if len(axes) < 3:
-        # exp(w) = 1 + K J
-        a, b, c = w.tolist()
-        K = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-        rows, known = np.vstack([rows, down + K @ (J @ down)]), np.append(known, 0.0)
+        rows, known = np.vstack([rows, rotation_matrix(w) @ down]), np.append(known, 0.0)
     return np.asarray(np.linalg.solve(rows, known))
 
 

@@ -124,7 +124,7 @@ class PageModel:
             holds=body.holds,
             radius=body.radius,
             radius_parameter=-1 if body.radius_parameter is None else body.radius_parameter,
-            tool=None if body.tool is None else drawn_tool(body.tool, body.parameters),
+            tool=None if body.tool is None else drawn_tool(body.tool, body.parameters, body.shift.tolist()),
             twists=body.tells_torque,
             deepest=body.deepest,
             force_max=body.force_max,

@@ -146,6 +146,12 @@ export class FileConnection {
     return place.map((v, k) => v + (depth - left) * normal[k]!) as Vec3;
   }
 
+  /** A contact point of the body: the core's lies on the surface that takes a tool's places. */
+  private shifted(contact: Vec3): Vec3 {
+    const shift = this.hello.tool?.shift ?? NOWHERE;
+    return contact.map((v, k) => v + shift[k]!) as Vec3;
+  }
+
   /** Displacements (3 N) of a line's nodes, m. */
   private shape(time: number): Float32Array {
     const { line, answer } = this;
@@ -197,7 +203,7 @@ export class FileConnection {
       resting: !held,
       stalled: false,
       parameters: this.parameters,
-      contact: touched ? touched.contact : this.line ? this.nodeAt(displacement) : hello.holds ? hello.centre : NOWHERE,
+      contact: touched ? this.shifted(touched.contact) : this.line ? this.nodeAt(displacement) : hello.holds ? hello.centre : NOWHERE,
       normal: touched ? touched.normal : NOWHERE,
       depth: answer ? answer.depth : 0,
       stiffness: held && answer && contact ? along(answer) : 0,

@@ -60,6 +60,7 @@ export interface Line {
 export interface DrawnTool {
   words: string;
   centre: Vec3;
+  shift: Vec3;
   points: number[];
   normals: number[];
   triangles: number[];

@@ -145,7 +145,11 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
     if mode is not None:
         # the core's contact points lie on the surface that takes places: a field's own less its shift
         shift = np.array(shown.shift)
-        tables |= {FIELD + 5: Table.of(mode.table), FIELD + 6: Table.of(nodes), FIELD + 7: Table.of(points - shift)}
+        tables |= {
+            FIELD + 5: Table.of(mode.table),
+            FIELD + 6: Table.of(nodes),
+            FIELD + 7: Table.of(points - shift),
+        }
         if mode.variation is not None:
             varied = mode.variation
             q, m = varied.table.shape[:2]

@@ -29,7 +29,7 @@ from palpate.surrogates import (
 )
 from palpate.surrogates.baselines import PosedBaseline, ToolBaseline, deepest_ball, registered_baselines
 from palpate.surrogates.energy_kernels import entry_of
-from palpate.surrogates.memories import Indentation, IwanElements, Memory, Patches, Relaxation
+from palpate.surrogates.memories import Friction, Indentation, IwanElements, Memory, Patches, Relaxation
 from palpate.tools import Capsule, PosedTool
 
 INF = np.inf
@@ -74,10 +74,12 @@ def tool() -> Example:
 def posed() -> Example:
     """A capsule on a plane whose axis is an input."""
     tool = PosedTool(Capsule(0.006, 0.03), (0.0, 0.0, 0.4), turns="axis", tilt=0.3)
-    way = np.array([0.0, 0.0, RADIUS])
+    way = np.array([0.0, 0.0, RADIUS - 0.008])  # not so deep that the plane's distance turns back
     moved = [pp.Range(f"tip{r.name[1:]}", r.low - w, r.high - w, "m") for r, w in zip(BOX, way, strict=True)]
     baseline = PosedBaseline(ContactLaw("series", 1e-3), plane(), 0.006, tool=json.dumps(tool.describe()))
-    going = Continuation.of([*moved, *tool.angles], deepest=DEEPEST + 0.005)  # its end may be so much deeper
+    going = Continuation.of(
+        [*moved, *tool.angles], deepest=DEEPEST - 0.003
+    )  # its end is deeper than its place
     energy = touch_energy(box=moved, extra=tool.angles, baseline=baseline, continuation=going)
     below = np.append(way, np.zeros(2))
     rest = around_points(100, extra=tool.angles) - below
@@ -86,7 +88,8 @@ def posed() -> Example:
     places, turns = tool.pose(smooth)
     # nor where one of its balls begins to touch
     heights = places[:, None, 2] + np.einsum("ni,bi->nb", turns[:, 2], baseline.balls[:, :3])
-    smooth = smooth[(np.abs(heights - baseline.balls[:, 3]) > 1e-4).all(axis=1)]
+    clear = (np.abs(heights - baseline.balls[:, 3]) > 1e-4).all(axis=1)
+    smooth = smooth[clear & (np.abs(places[:, :2]) < 0.025).all(axis=1)]
     return Example(pp.Surrogate(energy), rest, smooth)
 
 
@@ -156,7 +159,12 @@ def iwan_elements(q: float) -> Memory:
     )
 
 
-MEMORIES = (relaxation, indentation, iwan_elements)
+def friction(q: float) -> Memory:
+    """A dry tool on a body that relaxes."""
+    return Friction.over(0.005, 0.3, 0.4, under=relaxation(q))
+
+
+MEMORIES = (relaxation, indentation, iwan_elements, friction)
 
 
 def named(function) -> str:

@@ -172,7 +172,9 @@ class SolidProblem:
     def schema(self) -> tuple[Field, ...]:
         """Fields of each answer; a sweep asks for it."""
         edges = len(self.mesh.edges) if getattr(self.body.geometry, "drawn_apart", False) else 0
-        return solid_fields(len(self.mesh.points), self.ranges, stress=self.stress, edges=edges)
+        torque = any(isinstance(one, SurfaceTool) for one in self.interactions)
+        size = len(self.mesh.points)
+        return solid_fields(size, self.ranges, stress=self.stress, edges=edges, torque=torque)
 
     @property
     def design_name(self) -> str | None:

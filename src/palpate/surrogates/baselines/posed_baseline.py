@@ -12,7 +12,6 @@ touches. Of one ball it is the ball's depth. Derivatives by angles are differenc
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,10 +24,10 @@ from palpate.kernels import for_rows, kernel, part
 from palpate.surrogates.baselines.baseline import register_baseline
 from palpate.surrogates.baselines.contact_baseline import (
     STEP,
-    ContactBaseline,
     fill_law,
     leave_saturated,
 )
+from palpate.surrogates.baselines.tool_baseline import ToolBaseline
 from palpate.surrogates.energy_kernels import (
     BEND,
     MORE,
@@ -39,7 +38,7 @@ from palpate.surrogates.energy_kernels import (
     Compiled,
 )
 from palpate.surrogates.surface import distance_into
-from palpate.tools import PosedTool, front_balls
+from palpate.tools import front_balls
 from palpate.units import Range
 
 __all__ = ["PosedBaseline"]
@@ -50,7 +49,7 @@ _ORDER, _SCALE = 5, 6  # places in the numbers, after those of a contact and its
 
 @register_baseline
 @dataclass(frozen=True, eq=False)
-class PosedBaseline(ContactBaseline):
+class PosedBaseline(ToolBaseline):
     """The contact law of a rigid tool at the mean depth of the balls of its front.
 
     Attributes
@@ -73,31 +72,7 @@ class PosedBaseline(ContactBaseline):
 
     name: ClassVar[str] = "posed"
 
-    tool: str = ""
     order: float = 4.0
-
-    def __post_init__(self) -> None:
-        try:
-            _ = self.posed_tool
-        except (ValueError, KeyError, TypeError) as error:
-            raise UsageError(
-                "The baseline of a tool tells of no tool.",
-                why=str(error),
-                fix="Let `palpate.learn` make it, or copy the file again.",
-            ) from error
-
-    def __str__(self) -> str:
-        return f"{self.posed_tool}; {self.law}"
-
-    @cached_property
-    def posed_tool(self) -> PosedTool:
-        """The tool, with the orientation that it is turned from."""
-        return PosedTool.of(json.loads(self.tool))
-
-    @property
-    def probe_words(self) -> str:
-        """The tool in a few words."""
-        return f"a {self.posed_tool}"
 
     @cached_property
     def balls(self) -> np.ndarray:
@@ -105,6 +80,11 @@ class PosedBaseline(ContactBaseline):
         balls = front_balls(self.posed_tool.shape)
         balls[:, 2] += self.posed_tool.shape.front
         return balls
+
+    @property
+    def inner(self) -> float:
+        """Depth in m of a ball of the tool's size at which its own balls are as deep as the distance goes."""
+        return float(self.touched.inner - (self.probe_radius - self.balls[0, 3]))
 
     def fault(self, inputs: tuple[Range, ...]) -> str:
         """Return what does not fit the network's inputs; "" if all does."""
@@ -117,9 +97,14 @@ class PosedBaseline(ContactBaseline):
 
     def _arguments(self) -> tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray, np.ndarray]:
         own, step = self.posed_tool, STEP * self.probe_radius
-        numbers = np.array([*self.law.numbers(), len(own.angles), step, self.order, own.shape.size])
+        numbers = np.array([*self.law.numbers(), self.probe_radius, step, self.order, own.shape.size])
         turn = np.eye(3) if own.turn is None else np.ascontiguousarray(own.turn)
         return numbers, self.touched.compiled(), self.balls, turn, np.zeros((_ROWS, 3, 3))
+
+    @property
+    def c_name(self) -> str:
+        """Its own, not a ball's."""
+        return self.name
 
     def c_source(self) -> str:
         """Refuse: it has no exported form yet.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -17,9 +18,11 @@ from palpate.surrogates import (
     LearntEnergy,
     Surrogate,
 )
+from palpate.surrogates.baselines import PosedBaseline
 from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.surrogates.fields.local_mode import design
 from palpate.surrogates.memories import Indentation, Relaxation
+from palpate.tools import Capsule, PosedTool
 from palpate.units import Quantity, Range
 
 HALF, HIGH = 0.03, 0.02  # m: 60 × 60 × 20 mm
@@ -140,3 +143,31 @@ def family() -> Surrogate:
         continuation=Continuation.of(inputs, deepest=pressed.DEEPEST),
     )
     return Surrogate(energy, memory=Relaxation(((0.4, 0.05),)), meta={"name": "family"})
+
+
+TILT = 0.35  # rad, to which the tool of `slab_under_a_tool` tilts
+
+
+def slab_under_a_tool() -> Surrogate:
+    """The slab under a capsule that lies along x and tilts about x and y, with its displacement."""
+    tool = PosedTool(Capsule(0.004, 0.02), turns="axis", tilt=TILT)
+    described = json.dumps(tool.describe(), sort_keys=True)
+    places = [replace(r, name=f"tip{r.name[1:]}") for r in pressed.INPUTS[:2]]
+    inputs = (*places, Range("tip_z", -pressed.DEEPEST, 0.004, "m"), *tool.angles)
+    tail = np.array([[np.log(pressed.A), 0.0, 0.0, 0.0, 0.0, 0.0]])
+    energy = LearntEnergy(
+        linear_network(list(inputs), [Quantity("ln U/U0")], tail),
+        PosedBaseline(ContactLaw("pad"), pressed.face(), tool.shape.size, tool=described),
+        continuation=Continuation.of(inputs, deepest=pressed.DEEPEST),
+    )
+    plain = _field(pressed.surrogate().hand_energy, 3)
+    growth = np.hstack([plain.network.tail, np.zeros((2, 2))])
+    shown = replace(
+        plain,
+        network=linear_network(list(inputs), [Quantity("b0"), Quantity("b1")], growth),
+        radius=tool.shape.size,
+        tool=described,
+        local_mode=replace(plain.local_mode, variation=None),
+        continuation=None,
+    )
+    return Surrogate(energy, fields={"displacement": shown}, meta={"name": "slab"})

@@ -92,7 +92,9 @@ class Solves:
             for one in snapshots
         )
         context = (surface, radius, points, triangles, mass, radius_input)
-        return cls(tuple(snapshots), tuple(inputs), *context, interpolations, np.array(shift, dtype=float), contact)
+        return cls(
+            tuple(snapshots), tuple(inputs), *context, interpolations, np.array(shift, dtype=float), contact
+        )
 
     @property
     def touching(self) -> Solves:

@@ -51,7 +51,7 @@ export class PartForm {
     const value = (id: string): string => element<HTMLInputElement | HTMLSelectElement>(id).value;
     const [young, poisson] = [value("young"), value("poisson")];
     const [radius, depth] = [value("ball-radius"), value("ball-depth")];
-    const sizes = Object.fromEntries(this.tool.sizes.map(({ name }) => [name, value(`size-${name}`)]));
+    const sizes = Object.fromEntries(this.tool.sizes.map(({ name }) => [name, value(sizeId(name))]));
     return { material: value("material"), law: value("law"), young, poisson, radius, depth, trial, tool: this.tool.name, sizes };
   }
 
@@ -119,13 +119,13 @@ export class PartForm {
     element("tool-sizes").replaceChildren(
       ...tool.sizes.flatMap(({ name, words }) => {
         const [label, box] = [worded("label", words) as HTMLLabelElement, document.createElement("input")];
-        [box.id, box.type, box.autocomplete, box.spellcheck] = [`size-${name}`, "text", "off", false];
+        [box.id, box.type, box.autocomplete, box.spellcheck] = [sizeId(name), "text", "off", false];
         label.htmlFor = box.id;
         return [label, box];
       }),
     );
     for (const { name, value } of tool.sizes) {
-      this.boxes.set(`size-${name}`, `size-${name}`);
+      this.boxes.set(`size-${name}`, sizeId(name));
       this.prepare(`size-${name}`, value);
     }
     this.drawn = new ToolShape(null, ball ? this.radius : 0);
@@ -178,4 +178,9 @@ export class PartForm {
   private draw(): void {
     input("ball-radius").dataset["metres"] = String(this.radius); // for programs that drive the page
   }
+}
+
+/** The id of the box of a size. */
+function sizeId(name: string): string {
+  return `size-${name.replaceAll("_", "-")}`;
 }

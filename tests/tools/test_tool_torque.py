@@ -110,7 +110,9 @@ def test_a_learnt_arm_of_a_sphere_leads_to_its_centre():
     about_centre = np.linalg.norm(F, axis=1)[:, None] * arm.predict(unseen) - np.cross(way, F)
     size = np.linalg.norm(F, axis=1) * pressed.RADIUS
     assert (np.linalg.norm(about_centre, axis=1) < 1e-3 * size).all()
-    assert math.isclose(float(np.abs(arm.predict(unseen)[:, 2]).max()), 0.0, abs_tol=1e-12)  # none about its axis
+    assert math.isclose(
+        float(np.abs(arm.predict(unseen)[:, 2]).max()), 0.0, abs_tol=1e-12
+    )  # none about its axis
 
 
 def test_the_core_of_pages_and_engines_tells_the_torque(body):

@@ -118,7 +118,11 @@ class HandTurn:
                 w[k] = float(parameters[number])
             self.tool = rotation_matrix(np.array(w))
             return
-        w = rotation_vector(self.tool) if len(self._inputs) == 3 else swing_vector(self._axis, self.tool @ self._axis)
+        w = (
+            rotation_vector(self.tool)
+            if len(self._inputs) == 3
+            else swing_vector(self._axis, self.tool @ self._axis)
+        )
         for (number, k), (low, high) in zip(self._inputs, self._ranges, strict=True):
             parameters[number] = min(max(w[k], low), high)
 

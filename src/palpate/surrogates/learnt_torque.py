@@ -81,8 +81,8 @@ class TorqueEvaluator:
 class TurnEvaluator:
     """Torque by the energy's slopes along the turns: `torque` (3,), N m, is renewed by a call.
 
-    The energy is asked by `energy`, a function of a place (3,) in m and further inputs (p,) that returns U in J; `turns`
-    are the numbers of the further inputs that turn the tool, `rotation` (3, 3) its fixed rotation.
+    The energy is asked by `energy`, a function of a place (3,) in m and further inputs (p,) that returns U in J;
+    `turns` are the numbers of the further inputs that turn the tool, `rotation` (3, 3) its fixed rotation.
     """
 
     def __init__(

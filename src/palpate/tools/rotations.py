@@ -51,7 +51,9 @@ def swing_vector(before: np.ndarray, after: np.ndarray) -> list[float]:
     size = math.hypot(dx, dy)
     if size < 1e-12:
         return [0.0, 0.0, 0.0]
-    n = np.array([-dy / size, dx / size, 0.0])  # at right angles to the change, so both have the same part along it
+    n = np.array(
+        [-dy / size, dx / size, 0.0]
+    )  # at right angles to the change, so both have the same part along it
     across = before - (n @ before) * n
     angle = math.atan2(float(n @ np.cross(across, after)), float(across @ after))
     return [angle * float(n[0]), angle * float(n[1]), 0.0]

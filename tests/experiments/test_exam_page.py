@@ -134,6 +134,7 @@ def test_each_part_is_felt_again_bit_for_bit(taken):
         assert Replay(read_trace(path), load_touchable(past.folder / "felt.palpate")).run().identical
 
 
+@pytest.mark.full
 def test_practice_answers_each_mark_and_shows_lumps_when_asked(tmp_path):
     with exam_page(tmp_path) as page, examiner(page) as person:
         assert person.wish("practise")["lumps"] == []
@@ -149,6 +150,7 @@ def test_practice_answers_each_mark_and_shows_lumps_when_asked(tmp_path):
     assert past_examinations(tmp_path) == []  # practice is not kept
 
 
+@pytest.mark.full
 def test_the_hand_feels_the_lump_in_the_examination_alone(tmp_path):
     with exam_page(tmp_path, lumps=[Lump((0.0, 0.0, -0.008), 0.006, 10.0)]) as page, examiner(page) as person:
 
@@ -168,6 +170,7 @@ def test_the_hand_feels_the_lump_in_the_examination_alone(tmp_path):
         assert ratio() < 1.2
 
 
+@pytest.mark.grid
 @pytest.mark.parametrize(
     ("options", "error", "words"),
     [

@@ -31,7 +31,7 @@ from palpate.errors import PalpateError, UsageError
 from palpate.experiments.append_record import Clocks
 from palpate.experiments.exam_folders import exam_directory, past_examinations
 from palpate.experiments.exam_kinds import ExamKind, hide_lumps
-from palpate.experiments.exam_lumps import body_with_lumps, require_inside
+from palpate.experiments.exam_lumps import body_with_lumps, require_inside, skin_under
 from palpate.experiments.exam_practice import Practice
 from palpate.experiments.exam_report import score_page
 from palpate.experiments.exam_score import score_examination
@@ -292,7 +292,7 @@ class ExamPage(LocalServer):
 
     def _mark(self, marked: Examination | Practice, wish: ExamWish) -> None:
         if wish.wish == "mark":
-            marked.mark(wish.place)
+            marked.mark(skin_under(self._body, wish.place))
         elif wish.wish == "answer":
             marked.answer(wish.number, hardness=wish.hardness, depth=wish.depth)
         elif wish.wish == "remove":

@@ -202,7 +202,9 @@ def read_touch(traces: Sequence[Path], body: Touchable) -> ExamTouch:
 
 def _columns(trace: Trace, began: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     force = np.linalg.norm(trace.ticks["force"], axis=1)
-    felt = trace.flag("grabbed") & (force > 0.0)  # a stop or a fault withholds the force: nothing is felt then
+    felt = trace.flag("grabbed") & (
+        force > 0.0
+    )  # a stop or a fault withholds the force: nothing is felt then
     depth = np.where(felt, trace.ticks["depth"], 0.0).astype(float)
     return began + trace.time, np.array(trace.ticks["contact"]), depth, force
 

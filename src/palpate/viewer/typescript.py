@@ -80,6 +80,8 @@ def _type(hint: Any) -> str:
         return f"{_type(arguments[0])} | null"
     if origin is tuple and arguments[-1] is Ellipsis:
         return f"{_type(arguments[0])}[]"
+    if origin is tuple:
+        return f"[{', '.join(map(_type, arguments))}]"
     if origin is Mapping:
         return "Record<string, unknown>"
     return str(hint.__name__)

@@ -1,7 +1,8 @@
 """A lump: a ball inside a soft body whose modulus is another one than that of the tissue around it.
 
-Its edge is soft: with d the distance from its centre over its radius, the share χ of the lump in the tissue falls from
-1 at 1 − w/2 to 0 at 1 + w/2 by a quintic step, w = `WIDTH`. Moduli mix as Maxwell's law for a dilute suspension has it
+Its edge is soft: with d the distance from its centre over ρ, the share χ of the lump in the tissue falls from 1 at
+1 − w/2 to 0 at 1 + w/2 by a quintic step, w = `WIDTH`. ∫ χ dV is 1 + 3 w²/28 times the volume of a ball of radius ρ, so
+ρ is the lump's radius over `SWOLLEN`, the cube root of that. Moduli mix as Maxwell's law for a dilute suspension has it
 (Maxwell 1873, A Treatise on Electricity and Magnetism, art. 314): the energy density of the tissue is multiplied by
 
     m = 1 + x χ / (1 + MIX x (1 − χ)),   x = ratio − 1.
@@ -26,7 +27,8 @@ __all__ = ["EDGE", "MIX", "WIDTH", "Lump", "modulus_factor", "require_apart", "s
 
 WIDTH = 0.6  # of the soft edge, over the radius
 MIX = 0.4  # 2/5: the field of a stiff sphere in an incompressible matrix (Eshelby 1957)
-EDGE = 1.0 + WIDTH / 2  # where the edge ends, over the radius
+SWOLLEN = (1.0 + 3.0 * WIDTH**2 / 28.0) ** (1.0 / 3.0)  # radius of the sharp ball of equal volume, over ρ
+EDGE = (1.0 + WIDTH / 2) / SWOLLEN  # where the edge ends, over the radius
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Lump:
     place : (3,) tuple
         Its centre in the body's frame, m.
     radius : float
-        Radius in m, at half of its soft edge.
+        Radius in m of the sharp ball of the same volume.
     ratio : float
         Its modulus over that of the tissue around it, a pure number: 1 is no lump, 10 a hard one.
 
@@ -71,7 +73,7 @@ def share_of_lump(distance: Any, choose: Callable[[Any, Any, Any], Any] = _where
 
     `choose(v, a, b)` is a where v is positive and b elsewhere; symbolic distances bring their own.
     """
-    t = (distance - (1.0 - WIDTH / 2)) / WIDTH
+    t = (SWOLLEN * distance - (1.0 - WIDTH / 2)) / WIDTH
     t = choose(t, choose(1.0 - t, t, 1.0), 0.0)
     return 1.0 - t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
 

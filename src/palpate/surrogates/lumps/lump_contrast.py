@@ -4,7 +4,8 @@ Of a press at c whose energy is U and whose body has the strain-energy density W
 takes
 
     D = ∫ χ W dV           what it would take if nothing moved
-    β = bᵀ K⁻¹ b / 2D      how much the tissue gives way to it, b = ∂D/∂u, K the tangent
+    β = −½ ∂²U/∂x² / D     how much the tissue gives way to it: (½ bᵀK⁻¹b + 0.4 ∫ χ(1 − χ) W dV)/D with b = ∂D/∂u
+                           and the tangent K; the second term is of the soft edge, see `lump`
     ΔU ≈ x D/(1 + β x) · exp(k s²),   s = βx/(1 + βx)
 
 x D/(1 + β x) is the [1/1] Padé approximant in x, a lower bound in linear elasticity, as ΔU/x is a Stieltjes function
@@ -154,7 +155,12 @@ class LumpContrast:
 
     def looked_up(self, lump: Lump, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return ln(D/U) (N,), its slopes by the place (N, 3) in 1/m, ln β (N,) and its slopes, at places X (N, 3)."""
-        Z = contrast_inputs(X, np.broadcast_to(lump.place, X.shape), np.full(len(X), lump.radius))
+        return self.looked_up_at(
+            contrast_inputs(X, np.broadcast_to(lump.place, X.shape), np.full(len(X), lump.radius))
+        )
+
+    def looked_up_at(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return the same of inputs Z (N, 7), each of its own lump (see `contrast_inputs`)."""
         value, slopes = value_and_slopes(self.density, Z)
         softness, bends = value_and_slopes(self.compliance, Z)
         offset, squared = Z[:, 3:6], (Z[:, 3:6] ** 2).sum(axis=1)

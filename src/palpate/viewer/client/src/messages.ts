@@ -6,7 +6,7 @@ import type { Layout } from "./wire";
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 8;
+export const PROTOCOL = 9;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -56,6 +56,16 @@ export interface Line {
   travel: Vec3[];
 }
 
+/** The tool that presses a body: its closed surface around its place, in the body's axes. */
+export interface DrawnTool {
+  words: string;
+  centre: Vec3;
+  points: number[];
+  normals: number[];
+  triangles: number[];
+  turns: [number, number, number];
+}
+
 /** A state in words and figures. */
 export interface StepInfo {
   label: string;
@@ -76,6 +86,20 @@ export interface MaterialInfo {
   kind: string;
   young: string;
   poisson: string;
+}
+
+/** A size of a tool that can be chosen: its name in `StartWish`, what it is, and a text with its unit. */
+export interface SizeInfo {
+  name: string;
+  words: string;
+  value: string;
+}
+
+/** Something that can press a part: a ball, or a tool with sizes that suit the part. */
+export interface ToolInfo {
+  name: string;
+  about: string;
+  sizes: SizeInfo[];
 }
 
 /** A place that a person has marked on the skin, m, or one that practice shows. */
@@ -105,6 +129,7 @@ export interface Hello {
   holds: boolean;
   radius: number;
   radius_parameter: number;
+  tool: DrawnTool | null;
   deepest: number;
   force_max: number;
   stiffness_max: number;
@@ -130,6 +155,7 @@ export interface Shown {
   fields: FieldInfo[];
   steps: StepInfo[];
   reach: number;
+  tool: DrawnTool | null;
 }
 
 /** An event in plain words, server to page. */
@@ -187,6 +213,7 @@ export interface PartFacts {
   whole: boolean;
   materials: MaterialInfo[];
   laws: string[];
+  tools: ToolInfo[];
   choices: Record<string, unknown>;
   notes: string[];
 }
@@ -200,6 +227,8 @@ export interface StartWish {
   radius: string;
   depth: string;
   trial: boolean;
+  tool: string;
+  sizes: Record<string, unknown>;
 }
 
 /** The wish that the numbers of the file are taken in another unit, page to server. */
@@ -217,6 +246,7 @@ export interface Answer {
   problem: string;
   fields: Record<string, unknown> | null;
   trial: boolean;
+  tool: DrawnTool | null;
 }
 
 /** The state of solving and learning, server to page. */
@@ -332,7 +362,7 @@ export interface Frame {
   time: number;
   /** ms, page clock: `sent` of the last Hand that this page sent */
   echo: number;
-  /** m, the probe's centre, or the hand's offset from what it holds at rest */
+  /** m, the probe's centre or the tool's place, or the hand's offset from what it holds at rest */
   position: Vec3;
   /** N, on the hand */
   force: Vec3;

@@ -86,20 +86,8 @@ def hide_lumps(
 ) -> tuple[Lump, ...]:
     """Return the lumps of an examination, the same for the same seed; one in five examinations has none.
 
-    Sizes, depths and moduli are drawn without putting one back, so that each examination asks of all kinds evenly.
-
-    Parameters
-    ----------
-    kind : ExamKind
-        Sizes of lumps.
-    body : Touchable
-        The body without lumps.
-    surface : ExamSurface
-        Its surface, under which they are hidden.
-    seed : int
-        Of the draw.
-    learnt : LumpContrast, optional
-        The lumps that the body has learnt: only such are hidden then.
+    Sizes, depths and moduli are drawn without putting one back, so that each examination asks of all kinds evenly. The
+    lumps lie under the `surface` of the `body` without lumps; where it has `learnt` lumps, only such are hidden.
     """
     rng = np.random.default_rng(seed)
     touched = surface.inner(max(kind.diameters) / 2.0)  # so that a hand can press all around a lump

@@ -35,6 +35,7 @@ __all__ = [
     "place_of",
     "require_inside",
     "schematic_lumps",
+    "skin_under",
 ]
 
 LEAST_COVER = 0.001  # m of tissue over a lump: thinner, it would be seen
@@ -96,10 +97,7 @@ def body_with_lumps(surrogate: Surrogate, body: Touchable, lumps: Sequence[Lump]
 def require_inside(body: Touchable, lump: Lump, points: np.ndarray) -> LumpPlace:
     """Return a lump's place; refuse one that leaves the body, whose surface has the points (N, 3), m.
 
-    Raises
-    ------
-    UsageError
-        If less than a millimetre of tissue covers the lump, or another side of the body is nearer than its radius.
+    It is a UsageError that less than a millimetre of tissue covers it, or another side is nearer than its radius.
     """
     at = place_of(body, lump)
     size = f"The {lump}"

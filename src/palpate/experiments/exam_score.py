@@ -184,19 +184,8 @@ def _share(results: Iterable[LumpResult]) -> tuple[int, int]:
 def score_examination(past: PastExamination, body: Touchable | None = None) -> ExamScore:
     """Return the score of an examination on this machine.
 
-    A mark finds a lump within the lump's radius and half the probe's of the place of the skin above it.
-
-    Parameters
-    ----------
-    past : PastExamination
-        The examination, ended or not.
-    body : Touchable
-        The body without lumps; read from its file by default.
-
-    Raises
-    ------
-    UsageError, FileFormatError
-        If the body's file is missing or damaged.
+    A mark finds a lump within the lump's radius and half the probe's of the place of the skin above it. `body` is the
+    one without lumps, by default read from its file; a missing or damaged file is a FileFormatError.
     """
     body = load_touchable(past.body) if body is None else body
     marks = standing_marks(past.events)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from palpate.runtime.touchable import Touchable
 
 __all__ = [
+    "LEVELS",
     "ExamSurface",
     "ExamTouch",
     "Press",
@@ -29,6 +30,8 @@ __all__ = [
     "order_of_search",
     "pressed_depths",
     "read_touch",
+    "search_path",
+    "typical_force",
 ]
 
 LEVELS = {"lightly": 0.2, "to the middle": 0.45, "deeply": 0.75}
@@ -44,25 +47,13 @@ _CLEAR = 0.6  # share from which an order has a name
 
 @dataclass(frozen=True, eq=False)
 class ExamSurface:
-    """The surface of an examined body at rest.
+    """The surface of an examined body at rest."""
 
-    Attributes
-    ----------
-    points : (N, 3) array
-        Its points, m.
-    triangles : (k, 3) int array
-        Its triangles.
-    reachable : (N,) bool array
-        Points that a hand may press and that were trained: all others are no one's fault.
-    radius, deepest : float
-        Radius of the probe and deepest trained press, m.
-    """
-
-    points: np.ndarray
-    triangles: np.ndarray
-    reachable: np.ndarray
-    radius: float
-    deepest: float
+    points: np.ndarray  # (N, 3) m
+    triangles: np.ndarray  # (k, 3) int
+    reachable: np.ndarray  # (N,) bool: a hand may press there, and it was trained; all else is nobody's fault
+    radius: float  # of the probe, m
+    deepest: float  # trained press, m
 
     @classmethod
     def of(cls, body: Touchable) -> ExamSurface:
@@ -239,23 +230,13 @@ def pressed_depths(surface: ExamSurface, touch: ExamTouch) -> np.ndarray:
 
 @dataclass(frozen=True)
 class SearchOrder:
-    """The order in which a surface was searched, of steps between places half a probe's radius apart or more.
+    """The order in which a surface was searched, of steps between places half a probe's radius apart or more."""
 
-    Attributes
-    ----------
-    parallel : float
-        |Σ l e^{2iφ}| / Σ l of steps of length l and direction φ on the map: 1 for strips along one direction.
-    around : float
-        Share of the way that went around the middle of the places: 1 for circles, 0 for spokes.
-    again : float
-        Share of the places that were within a probe's radius of one visited more than 5 s before.
-    steps : int
-        Number of steps.
-    """
-
-    parallel: float
-    around: float
-    again: float
+    parallel: (
+        float  # |Σ l e^{2iφ}| / Σ l of steps of length l and direction φ on the map: 1 for parallel strips
+    )
+    around: float  # share of the way that went around the middle of the places: 1 for circles, 0 for spokes
+    again: float  # share of the places within a probe's radius of one visited more than 5 s before
     steps: int
 
     @property

@@ -33,8 +33,8 @@ class Mark:
 class Examination:
     """An examination in its folder; a context manager that lets go of its record.
 
-    `begin` makes one, `resume` goes on with one that was interrupted; one that has ended, or that another process holds, is
-    a UsageError. `marks` are those that stand now.
+    `begin` makes one, `resume` goes on with one that was interrupted; one that has ended, or that another process
+    holds, is a UsageError. `marks` are those that stand now.
     """
 
     def __init__(self, folder: Path, clocks: Clocks | None = None) -> None:

@@ -55,8 +55,8 @@ class Validation:
     notes : tuple of str
         What was not judged, and why.
     figures : mapping of name to Figure
-        ``force``, ``energy``, ``stiffness``, ``smoothness``, ``coverage``, ``contrast``, ``loops``, ``border_loops``, ``shape``,
-        ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``, ``answers``: see `palpate.validation.figures`.
+        ``force``, ``energy``, ``stiffness``, ``smoothness``, ``coverage``, ``contrast``, ``loops``, ``border_loops``,
+        ``shape``, ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``, ``answers``: see `palpate.validation.figures`.
     """
 
     name: str

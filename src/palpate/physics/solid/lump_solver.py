@@ -291,7 +291,7 @@ class _Tissue:
         self._linear, self._edge = (System(self._field, terms, free, "") for terms in (linear, edge))
 
     def moments(self, z: np.ndarray) -> tuple[float, float, np.ndarray]:
-        """Return ∫ χ W dV and −½ ∂²Π/∂ratio² at rest in J, of the lump that is set, and the slope (dof,) of the first."""
+        """Return ∫ χ W dV and −½ ∂²Π/∂ratio² in J of the lump that is set, and the slope (dof,) of the first."""
         return self._linear.potential(z), self._edge.potential(z), self._linear.gradient(z)
 
     def energies(

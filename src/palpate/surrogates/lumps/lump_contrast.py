@@ -218,8 +218,8 @@ class LumpContrast:
             if cover < least * (1 - SLACK):
                 raise UsageError(
                     f"The {lump} leaves the skin.",
-                    why=f"Its centre is {1e3 * cover:.3g} mm below the touched surface; with its edge and the tissue over "
-                    f"it, it needs {1e3 * least:.3g} mm.",
+                    why=f"Its centre is {1e3 * cover:.3g} mm below the touched surface; with its edge and the tissue "
+                    f"over it, it needs {1e3 * least:.3g} mm.",
                     fix=f"Move it {1e3 * (least - cover):.2g} mm deeper, or make it smaller.",
                 )
 

@@ -167,7 +167,7 @@ def test_what_makes_no_sense_is_refused(change, words):
 
 def test_a_lump_that_leaves_the_body_is_refused(opened):
     solver, free = opened
-    with pytest.raises(UsageError, match="leaves the body's skin"):
+    with pytest.raises(UsageError, match="leaves the skin"):
         solver.press_with(free, Lump((0.02, 0.02, 0.024), 0.005, 3.0))
 
 

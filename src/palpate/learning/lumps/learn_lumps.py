@@ -1,6 +1,6 @@
 """The energy that a lump adds to a press, learnt from lookups in presses without a lump.
 
-Rows are the lumps looked up in each press of a `LumpProblem`; `palpate.surrogates.lumps.lump_contrast` has the formulas.
+Rows are the lumps looked up in each press of a `LumpProblem`; `palpate.surrogates.lumps.lump_contrast` has formulas.
 Of ln(D/U) values and slopes by the place of the hand are fitted, of ln β values. The constant k of the closed form, and
 its error, come from the presses that were solved with a lump. The error is that of presses whose places were left out:
 ‖learnt − solved change of force‖ over the solved change, where that is above 1 % of the force.
@@ -20,7 +20,8 @@ from palpate.errors import UsageError
 from palpate.learning.dataset_symmetry import declared_symmetry
 from palpate.learning.lumps.gaussian_surfaces import Samples, as_network, fit_surface, fit_widths
 from palpate.network.network import Scaling
-from palpate.surrogates.lumps.lump_contrast import LumpContrast, LumpRoom, closed_form, contrast_inputs
+from palpate.surrogates.lumps.lump_contrast import LumpContrast, closed_form, contrast_inputs
+from palpate.surrogates.lumps.lump_room import LumpRoom, skin_of
 from palpate.units import Quantity, Range
 
 __all__ = ["LEAST_CONTRAST", "LumpPresses", "learn_lumps"]
@@ -92,6 +93,7 @@ class LumpPresses:
             Range("radius", *record["radius"], "m"),
             Range("ratio", *record["ratio"]),
             record["cover"],
+            skin_of(data.rest, data.triangles),
         )
         names = ("place", "radius", "energy", "slope", "compliance", "ratio", "added", "force")
         lumps = [np.asarray(data[f"lump_{name}"]) for name in names]

@@ -17,7 +17,8 @@ import palpate as pp
 from palpate.physics.materials.tissues import TISSUES
 from palpate.surrogates.shipped_bodies import FOLDER, SHIPPED
 
-PRESSES, UNSEEN = 39, 18
+PRESSES, UNSEEN = 56, 16
+DEPTHS = 2  # of each place: what a lump adds changes faster along the surface than with depth
 
 
 def breast() -> pp.LumpProblem:
@@ -65,12 +66,14 @@ def make(name: str, folder: Path, presses: int = PRESSES, unseen: int = UNSEEN) 
     """Solve, learn and judge a body; return its file, and keep its presses in a folder."""
     problem = BODIES[name]()
     print(f"{name}: {len(problem.mesh.points)} nodes", flush=True)
-    train = pp.sweep(problem, samples=presses, seed=1, workers=1, path=folder / f"{name}.zarr")
+    points = problem.design(presses, 1, depths=DEPTHS)
+    train = pp.sweep(problem, points=points, workers=1, path=folder / f"{name}.zarr")
     body, history = pp.learn(train, name=name, effort=0.3, log=print)
     print(history, body.lumps, sep="\n", flush=True)
     if unseen:
         judged = replace(problem, solved=1.0)
-        test = pp.sweep(judged, samples=unseen, seed=2, workers=1, path=folder / f"{name}-unseen.zarr")
+        points = judged.design(unseen, 2, depths=DEPTHS)
+        test = pp.sweep(judged, points=points, workers=1, path=folder / f"{name}-unseen.zarr")
         verdict = pp.validate(body, test)
         print(verdict, flush=True)
         body = replace(body, meta={**body.meta, "validation": verdict.summary()})

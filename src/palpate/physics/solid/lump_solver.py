@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["LumpSolution", "LumpSolver"]
 
 NO_LUMP = (0.0, 0.0, 0.0, 1.0, 1.0)  # x, y, z, radius (m) and ratio
-NEAR = 0.025  # m beyond the ball's surface: half the lumps are looked up within that
+NEAR = 0.014  # m beyond the ball: half the lumps are looked up within that, where they are felt
 TRIES = 16  # candidates for each lump that is looked up
 STEPS = (
     2e-4,

@@ -55,8 +55,8 @@ class Validation:
     notes : tuple of str
         What was not judged, and why.
     figures : mapping of name to Figure
-        ``force``, ``energy``, ``stiffness``, ``smoothness``, ``coverage``, ``contrast``, ``loops``, ``border_loops``,
-        ``shape``, ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``, ``answers``: see
+        ``force``, ``energy``, ``torque``, ``stiffness``, ``smoothness``, ``coverage``, ``contrast``, ``loops``,
+        ``border_loops``, ``shape``, ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``, ``answers``: see
         `palpate.validation.figures`.
     """
 
@@ -154,6 +154,8 @@ class Validation:
             found["unseen histories"] = self.histories.count
         found["force error, median"] = force.median
         found["force error, 95th percentile"] = force.p95
+        if self.torque is not None:
+            found["torque error over force times the tool's size, 95th percentile"] = self.torque.p95
         if self.whole_force_error is not None:
             found["force error with the mesh's"] = self.whole_force_error
             found["force error, the mesh's part"] = self.mesh_part

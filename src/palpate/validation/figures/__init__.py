@@ -21,6 +21,7 @@ from palpate.validation.figures.loop_work import border_work, closed_path_work
 from palpate.validation.figures.mesh_error import mesh_error
 from palpate.validation.figures.smoothness import stroke_smoothness
 from palpate.validation.figures.stiffness import stiffness_matrix
+from palpate.validation.figures.torque import torque_on_tool
 from palpate.validation.figures.worst_cases import parts_of_test, worst_of_test
 from palpate.validation.subject import Subject
 
@@ -29,6 +30,7 @@ __all__ = ["FIGURES"]
 FIGURES: tuple[tuple[str, Callable[[Subject], Figure | str | None]], ...] = (
     ("force", force_on_hand),
     ("energy", energy_of_touches),
+    ("torque", torque_on_tool),
     ("parts", parts_of_test),
     ("networks", network_outputs),
     ("stiffness", stiffness_matrix),

@@ -17,7 +17,7 @@ import palpate as pp
 from palpate.physics.materials.tissues import TISSUES
 from palpate.surrogates.shipped_bodies import FOLDER, SHIPPED
 
-PRESSES, UNSEEN = 56, 16
+PRESSES, UNSEEN = 40, 16
 DEPTHS = 2  # of each place: what a lump adds changes faster along the surface than with depth
 
 
@@ -68,7 +68,7 @@ def make(name: str, folder: Path, presses: int = PRESSES, unseen: int = UNSEEN) 
     print(f"{name}: {len(problem.mesh.points)} nodes", flush=True)
     points = problem.design(presses, 1, depths=DEPTHS)
     train = pp.sweep(problem, points=points, workers=1, path=folder / f"{name}.zarr")
-    body, history = pp.learn(train, name=name, effort=0.3, log=print)
+    body, history = pp.learn(train, name=name, effort=0.15, log=print)
     print(history, body.lumps, sep="\n", flush=True)
     if unseen:
         judged = replace(problem, solved=1.0)

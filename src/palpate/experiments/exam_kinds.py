@@ -93,6 +93,7 @@ def hide_lumps(
     touched = surface.inner(max(kind.diameters) / 2.0)  # so that a hand can press all around a lump
     if rng.random() < _NONE or not len(touched) or body.surface is None:
         return ()
+    shares = surface.areas[touched] / surface.areas[touched].sum()
     _, slope, _ = body.surface.at(surface.points[touched])
     normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
     sorts = _sorts(kind, learnt)
@@ -100,7 +101,7 @@ def hide_lumps(
     lumps: list[Lump] = []
     for diameter, cover, ratio in (sorts[k] for k in order):
         for _ in range(_TRIES):
-            k = int(rng.integers(len(touched)))
+            k = int(rng.choice(len(touched), p=shares))
             below = rng.uniform(*cover) + diameter / 2.0
             x, y, z = (surface.points[touched[k]] - below * normals[k]).tolist()
             lump = Lump((x, y, z), diameter / 2.0, ratio)
@@ -131,7 +132,7 @@ def _fits(body: Touchable, lump: Lump, surface: ExamSurface, learnt: LumpContras
     try:
         require_inside(body, lump, surface.points)
         if learnt is not None:
-            learnt.require(body.energy, [lump])
+            learnt.require([lump])
     except UsageError:
         return False
     return True

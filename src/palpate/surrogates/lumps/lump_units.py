@@ -42,7 +42,7 @@ def energy_with_lumps(energy: LearntEnergy, contrast: LumpContrast, lumps: Seque
             why=f"The inputs of this one are {', '.join(r.name for r in energy.inputs)}.",
             fix="Learn the body with fixed numbers.",
         )
-    contrast.require(energy, lumps)
+    contrast.require(lumps)
     felt = [lump for lump in lumps if lump.ratio != 1.0]
     if not felt:
         return energy

@@ -66,6 +66,7 @@ from .shapes import Tube as Tube
 from .solid import Body as Body
 from .solid import BodyFamily as BodyFamily
 from .solid import FamilyProblem as FamilyProblem
+from .solid import LumpProblem as LumpProblem
 from .solid import SolidProblem as SolidProblem
 from .solid import SolidSolution as SolidSolution
 from .solid import Varied as Varied

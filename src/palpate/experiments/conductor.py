@@ -18,7 +18,7 @@ import numpy as np
 
 from palpate.devices import device_traits
 from palpate.errors import PalpateError, UsageError
-from palpate.experiments.plan import Plan
+from palpate.experiments.experiment_plan import Plan
 from palpate.experiments.sitting import Sitting, Trial
 from palpate.experiments.stimuli import Felt, Stimuli
 from palpate.experiments.study_folder import SittingFiles

@@ -23,7 +23,18 @@ from palpate.input_files import read_toml
 from palpate.record_complaints import complaints
 from palpate.records import Count, Metres, Newtons, Number, Record
 
-__all__ = ["Plan", "read_plan"]
+__all__ = [
+    "Comparison",
+    "DeviceRules",
+    "Expected",
+    "Placed",
+    "Plan",
+    "Rating",
+    "SittingRules",
+    "Varied",
+    "Wanted",
+    "read_plan",
+]
 
 _LABEL = r"^[A-Za-z0-9]+$"  # BIDS takes letters and digits alone in labels
 

@@ -105,6 +105,13 @@ def _yielding() -> pp.Surrogate:
     )
 
 
+def _rubbed() -> pp.Surrogate:
+    """A flat body that relaxes, under a ball that sticks and slides."""
+    relaxes = Relaxation(((0.3, 0.05), (0.2, 0.4)))
+    body = pp.Surrogate(touch_energy(), memory=relaxes, meta={"name": "rubbed"})
+    return body.with_friction(0.3, 0.4)
+
+
 def _egg() -> pp.Surrogate:
     """An ellipsoid of 72, 60 and 42 mm, touched from all sides, its top the origin."""
     points, triangles = skins.ball(0.03, 7)
@@ -132,6 +139,7 @@ BODIES = {
     "closed": _egg,
     "overlap": _grooved,
     "indentation": _yielding,
+    "friction": _rubbed,
     "pad": _glued_pad,
     "constant": _node,
     "iwan": _rod,

@@ -28,7 +28,7 @@ from palpate.surrogates import (
 )
 from palpate.surrogates.baselines import ToolBaseline, deepest_ball, registered_baselines
 from palpate.surrogates.energy_kernels import entry_of
-from palpate.surrogates.memories import Indentation, IwanElements, Memory, Patches, Relaxation
+from palpate.surrogates.memories import Friction, Indentation, IwanElements, Memory, Patches, Relaxation
 from palpate.tools import Capsule, PosedTool
 
 INF = np.inf
@@ -135,7 +135,12 @@ def iwan_elements(q: float) -> Memory:
     )
 
 
-MEMORIES = (relaxation, indentation, iwan_elements)
+def friction(q: float) -> Memory:
+    """A dry tool on a body that relaxes."""
+    return Friction.over(0.005, 0.3, 0.4, under=relaxation(q))
+
+
+MEMORIES = (relaxation, indentation, iwan_elements, friction)
 
 
 def named(function) -> str:

@@ -11,6 +11,7 @@ import typer
 from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.device_commands import devices_app
+from palpate.cli.exam_command import exam
 from palpate.cli.exchange_commands import card, export_dataset
 from palpate.cli.experiment_commands import experiment_app
 from palpate.cli.export_commands import export_app
@@ -21,7 +22,7 @@ from palpate.cli.sweep_command import sweep
 from palpate.cli.table_commands import correct, fit
 from palpate.cli.table_options import Force, Json, Verbose, with_table_options
 from palpate.cli.touch_command import touch
-from palpate.cli.touch_options import DeadMan, Device, NoController, Unsoftened
+from palpate.cli.touch_options import DeadMan, Device, Friction, NoController, Unsoftened
 from palpate.cli.trace_commands import replay, trace_app
 from palpate.cli.umbridge_command import serve_umbridge
 from palpate.errors import UsageError
@@ -231,6 +232,7 @@ def view(
     unsoftened: Unsoftened = False,
     no_controller: NoController = False,
     dead_man: DeadMan = False,
+    friction: Friction = None,
 ) -> None:
     """Open a page on which you can touch the model, or set its inputs by sliders. Only this machine can reach it."""
     if _shows_answers(model, port=port, browser=browser, strict_port=strict_port, token=token):
@@ -245,6 +247,7 @@ def view(
         unsoftened=unsoftened,
         controller=not no_controller,
         dead_man=dead_man,
+        friction=friction,
     )
 
 
@@ -313,6 +316,7 @@ def run(
     unsoftened: Unsoftened = False,
     no_controller: NoController = False,
     dead_man: DeadMan = False,
+    friction: Friction = None,
     record: Annotated[
         Path | None, typer.Option(help="New file that takes every tick; see [bold]palpate replay[/].")
     ] = None,
@@ -331,11 +335,13 @@ def run(
         controller=not no_controller,
         dead_man=dead_man,
         record=record,
+        friction=friction,
     )
 
 
 app.command()(replay)
 app.command()(touch)
+app.command()(exam)
 app.command()(fit)
 app.command()(correct)
 app.command()(card)
@@ -436,12 +442,13 @@ def _serve(
     unsoftened: bool = False,
     controller: bool = True,
     dead_man: bool = False,
+    friction: float | None = None,
 ) -> None:
     from palpate.runtime.touchable import aim_device, load_touchable
     from palpate.runtime.warm_up import WarmUp
     from palpate.viewer import serve
 
-    body = load_touchable(model)
+    body = load_touchable(model, friction)
     device = aim_device(device, body)  # a name that is none is refused before anything is compiled
     with WarmUp("loop", body=body) as warm_up:
         Console().say(f"Opening the page of {model} … {warm_up.words}".rstrip())
@@ -459,4 +466,5 @@ def _serve(
         unsoftened=unsoftened,
         controller=controller,
         dead_man=dead_man,
+        friction=friction,
     )

@@ -93,15 +93,17 @@ def run_loop(
     controller: bool = True,
     dead_man: bool = False,
     record: Path | None = None,
+    friction: float | None = None,
 ) -> None:
     """Run a model's loop for a while, in s, and print its report.
 
     The device is its name, with its options after a colon; the rate (Hz) is by default the body's own, or 1000.
     `unsoftened` lets a body that is too stiff for the device feel so all the same, `controller` lets the passivity
     controller damp, and with `dead_man` the force acts only while the device's first button is held. `record` is a new
-    file that takes every tick; if it stops by itself the loop runs on, and a `ResourceError` follows the report.
+    file that takes every tick; if it stops by itself the loop runs on, and a `ResourceError` follows the report. A
+    coefficient of `friction` of the tool takes the place of the file's.
     """
-    touch = load_touchable(model)
+    touch = load_touchable(model, friction)
     device_traits(device)  # a name that is none is refused before anything is compiled
     settings = touch.meta.get("runtime", {})
     rate = rate or settings.get("rate", 1000.0)
@@ -126,6 +128,7 @@ def run_loop(
             dead_man=dead_man,
             record=record,
             aim=True,
+            friction=friction,
         ) as loop,
         contextlib.suppress(KeyboardInterrupt),
         terminal_keys() as keys,

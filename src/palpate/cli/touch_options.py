@@ -6,11 +6,21 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["DeadMan", "Device", "NoController", "Unsoftened"]
+from palpate.cli.number_options import number_option
+
+__all__ = ["DeadMan", "Device", "Friction", "NoController", "Unsoftened"]
 
 Device = Annotated[
     str,
     typer.Option(help="Device with its settings, for example stroke:amplitude=0.02,frequency=1 or haply."),
+]
+Friction = Annotated[
+    float | None,
+    number_option(
+        "--friction",
+        least=0.0,
+        help="Coefficient of friction of the tool on the body, such as 0.3. Default: that of the model.",
+    ),
 ]
 Unsoftened = Annotated[
     bool,

@@ -56,7 +56,7 @@ def _run(options: SimpleNamespace) -> int:
     desk = SwapDesk(_say)
     orphaned = _watch_parent(desk.ask)
     import_when_needed(options.modules)
-    model = load_touchable(options.model)
+    model = load_touchable(options.model, options.friction)
     if options.replay:
         trace = read_trace(options.replay)
         play(trace, model, shared, orphaned, same=is_recorded_model(trace, options.model))

@@ -42,6 +42,11 @@ class Model(Protocol):
         """The inputs that the hand doesn't supply."""
         ...
 
+    @property
+    def tool_axis(self) -> np.ndarray:
+        """The axis (3,) of the tool that the hand moves, a unit vector; z of any other body."""
+        ...
+
     def evaluator(self) -> HandEvaluator:
         """Return the allocation-free evaluator."""
         ...
@@ -59,9 +64,11 @@ class HandEvaluator:
     unit vectors, x, y and z unless given; `normal` (3,) is the outer normal of the surface where a probe usually
     touches; `inner` is how far inside it the probe's centre may go, m, infinite for a body that never lets go; `radius`
     is the probe's, m, unless it is the further input of number `radius_input`; `places` are those further inputs that a
-    hand which holds can't change: they say where it has taken hold. One for a `few` places interprets kernels.
+    hand which holds can't change: they say where it has taken hold. `further` is the number of further inputs of a body
+    under a tool with friction; one more after them is its coefficient. One for a `few` places interprets kernels. Of a
+    tool that tells its torque, `torque_at` is as `palpate.surrogates.Surrogate.torque_evaluator` gives it.
 
-    Its answer: `force` (3,), N, on the hand; `contact` (3,), m, the probe's centre or the offset of the held place from
+    Its answer: `force` (3,), N, on the hand; `torque` (3,), N m, on the tool about its place, zero where none is told; `contact` (3,), m, the probe's centre or the offset of the held place from
     its rest; `loads` (n,), the inputs of the field at its nodes there, such as loads, N; `inside` the trained region or
     not; `let_go` where the body has let go of a probe that is still in it; `stiffness`, −F·(∂F/∂x)F/‖F‖², N/m, along
     the force of the elastic answer, zero without force or where it isn't known; `depth`, m, of the rigid probe in the
@@ -88,18 +95,24 @@ class HandEvaluator:
         radius_input: int | None = None,
         node: Any = None,
         places: tuple[int, ...] = (),
+        further: int | None = None,
+        torque_at: Any = None,
         few: bool = False,
     ) -> None:
+        self._torque_at = torque_at
+        self.torque: np.ndarray = np.zeros(3) if torque_at is None else torque_at.torque
         self._elastic, self._memory, self._holds = elastic, memory, holds
         self.away = np.zeros(3) if away is None else away
         self._normal = np.array([0.0, 0.0, 1.0]) if normal is None else normal
         self._inner, self._radius, self._radius_input = inner, radius, radius_input
         self._places, self._taken = places, np.zeros(0)
+        self._further = further if hasattr(memory, "rub") else None
         felt = np.eye(3) if directions is None else np.ascontiguousarray(directions, dtype=np.float64)
         self._stays: Any = None
         if hasattr(memory, "release"):
             self._stays = MovingRest(elastic, memory, felt[0])
-        self._indentation = memory if hasattr(memory, "now") else None
+        own = getattr(memory, "of_body", memory)
+        self._indentation = own if hasattr(own, "now") else None
         self.indentation = np.zeros(0) if self._indentation is None else self._indentation.now
         self.force: np.ndarray = elastic.force if memory is None else memory.force
         self._node, self._place = node, np.zeros(3)
@@ -188,6 +201,9 @@ class HandEvaluator:
     def __call__(self, position: np.ndarray, parameters: np.ndarray) -> None:
         """Renew the attributes for a probe or a held place at `position` (3,), m, and the further inputs (p,)."""
         elastic, memory = self._elastic, self._memory
+        if self._further is not None and len(parameters) > self._further:
+            memory.rub(float(parameters[self._further]))
+            parameters = parameters[: self._further]
         if self._places:
             parameters = self._where_taken(parameters)
         if self._stays is not None and not self._held:
@@ -214,6 +230,8 @@ class HandEvaluator:
         untouched = self.let_go or (self.waiting and not self._holds)
         self.depth = 0.0 if untouched else elastic.depth
         self.stiffness = self._stiffness_along(elastic.force, elastic.stiffness)
+        if self._torque_at is not None:
+            self._torque_at(position, parameters, self.force)
         if not good:
             self.force[:] = math.nan  # the loop makes a fault of it
 

@@ -75,6 +75,8 @@ class LoopProcess:
         Recorded touch that is gone through instead of a device, at the pace at which it was recorded.
     aim : bool
         Whether a scripted stroke without a place presses where the body was trained to be pressed.
+    friction : float, optional
+        Coefficient of friction of the tool, a pure number; by default that of the body's file.
 
     Raises
     ------
@@ -100,6 +102,7 @@ class LoopProcess:
         record: str | os.PathLike[str] | None = None,
         replay: str | os.PathLike[str] | None = None,
         aim: bool = False,
+        friction: float | None = None,
     ) -> None:
         traits = device_traits(device)
         if dead_man and not traits.buttons:
@@ -120,6 +123,7 @@ class LoopProcess:
             "control": controller,
             "dead_man": dead_man,
             "aim": aim,
+            "friction": friction,
             "replay": "" if replay is None else os.fspath(replay),
         }
         self._model, self._record, self._replayed = model, record, replay is not None
@@ -202,7 +206,7 @@ class LoopProcess:
         with self._swapping:
             if not self.alive:
                 raise self._failure("The real-time process has ended.")
-            body = prepared(load_touchable(model))
+            body = prepared(load_touchable(model, self._options["friction"]))
             facts = model_facts(Path(model).absolute())
             self._wishes += 1
             shared = hand_over(body)

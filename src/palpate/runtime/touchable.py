@@ -13,7 +13,7 @@ import itertools
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -24,15 +24,20 @@ from palpate.devices import device_traits
 from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
-from palpate.surrogates import Field, LearntEnergy, NodeField, Surrogate, TouchedSurface
+from palpate.surrogates import Field, LearntEnergy, LearntQuantities, NodeField, Surrogate, TouchedSurface
+from palpate.surrogates.baselines import deepest_ball
 from palpate.surrogates.fields import line_of
-from palpate.surrogates.memories import Memory
+from palpate.surrogates.learnt_torque import ARM, torque_evaluator
+from palpate.surrogates.memories import Friction, Memory
 from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.surrogate import correction_count, correction_warning
+from palpate.surrogates.tool_friction import with_friction
+from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 
-__all__ = ["Touchable", "aim_device", "load_touchable", "touchable"]
+__all__ = ["FRICTION", "Touchable", "aim_device", "load_touchable", "touchable"]
 
+FRICTION = "friction"  # name of the further input that is the coefficient of friction
 _SHARE = 0.75  # of the deepest trained depth: how deep a scripted stroke goes
 _WAY, _PAUSE = 9, 0.1  # places on the way to an end, and the time from one to the next, s
 _SLIVER = 1e-3  # of the deepest depth: shallower is no press
@@ -50,6 +55,7 @@ class Touchable:
     name: str = "body"  # of the body, as pages and reports call it
     memory: Memory | None = None  # what it remembers of how it was touched
     meta: Mapping[str, Any] = field(default_factory=dict)  # what the file says of its making
+    arm: LearntQuantities | None = None  # torque per newton about a tool's place, where that is learnt
 
     def __str__(self) -> str:
         return f"Touchable {self.name}: {self.energy}"
@@ -63,13 +69,43 @@ class Touchable:
 
     @property
     def parameters(self) -> tuple[Range, ...]:
-        """The inputs that the hand doesn't supply."""
-        return tuple(self.energy.parameters)
+        """The inputs that the hand doesn't supply, the coefficient of friction last where there is friction."""
+        law = self.friction
+        if law is None or law.kinetic == 0.0:
+            return tuple(self.energy.parameters)
+        # its middle, with which loop and page begin, is the body's own
+        return (*self.energy.parameters, Range(FRICTION, 0.0, 2.0 * law.kinetic, ""))
+
+    @property
+    def friction(self) -> Friction | None:
+        """The friction of the tool on it; None without."""
+        return self.memory if isinstance(self.memory, Friction) else None
+
+    def with_friction(self, kinetic: float, static: float | None = None) -> Touchable:
+        """Return the same body with another friction, pure numbers; the same value where it has just that."""
+        law, static = self.friction, kinetic if static is None else static
+        if (kinetic, static) == ((0.0, 0.0) if law is None else (law.kinetic, law.static)):
+            return self
+        return replace(self, memory=with_friction(self.energy, self.memory, kinetic, static))
 
     @property
     def surface(self) -> TouchedSurface | None:
         """The touched surface at rest, where a free probe touches one; otherwise None."""
         return self.energy.baseline.surface
+
+    @property
+    def tool(self) -> PosedTool | None:
+        """The rigid tool that presses, in the orientation in which its further inputs find it; None of a ball."""
+        tool = getattr(self.energy.baseline, "posed_tool", None)
+        return tool if isinstance(tool, PosedTool) else None
+
+    @cached_property
+    def shift(self) -> np.ndarray:
+        """Way (3,) in m from a tool's place to the centre of the ball whose depth counts; zero of a ball.
+
+        `surface` is the body's less this way, so that it takes places.
+        """
+        return np.zeros(3) if self.tool is None else deepest_ball(self.tool, self.normal)[1]
 
     @property
     def holds(self) -> bool:
@@ -87,6 +123,12 @@ class Touchable:
         return line_of(self.fields)
 
     @property
+    def tool_axis(self) -> np.ndarray:
+        """The tool's own axis (3,), a unit vector; z of a probe that has none."""
+        turn = getattr(getattr(self.energy.baseline, "posed_tool", None), "turn", None)
+        return np.array([0.0, 0.0, 1.0]) if turn is None else np.ascontiguousarray(turn[:, 2])
+
+    @property
     def stays(self) -> bool:
         """True for a body that lies elsewhere after a touch, so that there is no swing back to rest."""
         return self.memory is not None and self.memory.moves_rest
@@ -100,7 +142,7 @@ class Touchable:
     @property
     def _felt(self) -> int:
         """Number of the inputs that the hand supplies: three, or the directions in which it can move a node."""
-        return len(self.inputs) - len(self.parameters)
+        return len(self.inputs) - len(self.energy.parameters)
 
     @property
     def radius(self) -> float:
@@ -211,7 +253,7 @@ class Touchable:
         Further inputs that are lengths and whose names end with an axis, such as ``p_x``, are its coordinates.
         """
         place = np.zeros(3)
-        for value, known in zip(parameters, self.parameters, strict=True):
+        for value, known in zip(parameters, self.energy.parameters, strict=True):
             if known.unit == "m" and known.name[-2:] in {"_x", "_y", "_z"}:
                 place["xyz".index(known.name[-1])] = value
         return place
@@ -225,7 +267,8 @@ class Touchable:
     @property
     def indentation(self) -> Any:
         """The memory of its indentation; None for a body that keeps none."""
-        return self.memory if self.memory is not None and self.memory.keeps_indentation else None
+        memory = None if self.memory is None else self.memory.of_body
+        return memory if memory is not None and memory.keeps_indentation else None
 
     def evaluator(self, *, few: bool = False) -> HandEvaluator:
         """Return the allocation-free evaluator of the 1 kHz path; one for a `few` places waits for no compiler."""
@@ -245,6 +288,8 @@ class Touchable:
             inner=self.energy.baseline.inner,
             radius=self.energy.baseline.radius,
             radius_input=self.radius_parameter,
+            further=len(self.energy.parameters),
+            torque_at=torque_evaluator(self.energy, self.arm),
             few=few,
         )
 
@@ -330,10 +375,15 @@ def touchable(model: Surrogate, name: str = "") -> Touchable:
             " with a warning" if correction_warning(model.meta) else ""
         )
     fields = {name: shown for name, shown in model.fields.items() if shown.carrier != "places"}
-    return Touchable(model.hand_energy, fields, known, model.memory, model.meta)
+    arm = model.quantities.get(ARM)
+    return Touchable(model.hand_energy, fields, known, model.memory, model.meta, arm)
 
 
-def load_touchable(path: str | os.PathLike[str]) -> Touchable:
-    """Read a learnt body that can be touched from its file, whose stem names a body whose own record has no name."""
+def load_touchable(path: str | os.PathLike[str], friction: float | None = None) -> Touchable:
+    """Read a learnt body that can be touched from its file, whose stem names a body whose own record has no name.
+
+    A coefficient of friction, a pure number, takes the place of its own.
+    """
     path = Path(path)
-    return touchable(Surrogate.load(path), path.stem)
+    body = touchable(Surrogate.load(path), path.stem)
+    return body if friction is None else body.with_friction(friction)

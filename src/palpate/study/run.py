@@ -236,6 +236,8 @@ def learn_study(
     whole = with_elastic(study, train)
     model, history = learn_dataset(whole, leave_out=leave_out, on_step=on_step, **options)
     model = with_relaxation(study, model, log)
+    if study.runtime.friction is not None:
+        model = model.with_friction(study.runtime.friction, study.runtime.static_friction)
     if whole is not train:  # it is recognised by what its file holds
         model = _with_meta(model, {"dataset": model.meta["dataset"] | {"hash": train.hash}})
     return _with_meta(model, {"runtime": study.runtime.model_dump()}), history

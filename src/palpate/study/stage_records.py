@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from palpate.learning.pressed_solves import FEWEST
 from palpate.options import EnergyOptions, Options, declarations
 from palpate.records import Count, Metres, Newtons, Number, Record
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "SECTIONS",
     "EnergyLearningRecord",
+    "PressSweepRecord",
     "RuntimeRecord",
     "SweepRecord",
     "TouchTargetRecord",
@@ -51,6 +53,30 @@ class SweepRecord(Record):
     def arguments(self, problem: Any) -> dict[str, Any]:
         """Return the arguments of `palpate.sweep` that say where to solve."""
         return {"samples": self.samples, "seed": self.seed}
+
+
+class PressSweepRecord(SweepRecord):
+    """Touches that are solved: depth series, each from shallow to deep."""
+
+    samples: Count = Field(40, ge=FEWEST, description="number of solves")
+    depths: Count = Field(5, ge=1, description="solves in a depth series")
+    element: Metres | None = Field(
+        None,
+        gt=0,
+        description="size of elements under what presses; left out: half its radius, less on round and layered bodies "
+        "and under edges",
+        examples=["4 mm"],
+    )
+
+    @model_validator(mode="after")
+    def _whole_series(self) -> PressSweepRecord:
+        if self.depths > self.samples:
+            raise ValueError(f"{self.samples} solves make no depth series of {self.depths}")
+        return self
+
+    def arguments(self, problem: Any) -> dict[str, Any]:
+        """Return the arguments of `palpate.sweep` that say where to solve."""
+        return {"points": problem.design(self.samples, self.seed, depths=self.depths), "seed": self.seed}
 
 
 class EnergyLearningRecord(Record):
@@ -104,4 +130,26 @@ class RuntimeRecord(Record):
 
     rate: Number = Field(1000.0, ge=10, le=10000, description="Hz")
     max_force: Newtons = Field(12.0, gt=0, description="largest force; the force is limited to this")
+    friction: Number | None = Field(
+        None,
+        ge=0,
+        description="coefficient of friction of the tool that slides on the body; left out: none",
+        examples=[0.3],
+    )
+    static_friction: Number | None = Field(
+        None,
+        ge=0,
+        description="the same of a tool at rest; left out: as that of one that slides",
+        examples=[0.4],
+    )
     port: Count = Field(8080, ge=0, le=65535, description="of the page; a busy port moves on to the next")
+
+    @model_validator(mode="after")
+    def _static_is_larger(self) -> RuntimeRecord:
+        if self.static_friction is not None and (
+            self.friction is None or self.static_friction < self.friction
+        ):
+            raise ValueError(
+                "static_friction is the coefficient of a tool at rest: give it beside friction, and no less than that"
+            )
+        return self

@@ -11,7 +11,7 @@ from __future__ import annotations
 import html
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -34,9 +34,14 @@ from palpate.surrogates.fields import (
     surface_fields,
 )
 from palpate.surrogates.learnt_quantities import LearntQuantities
+from palpate.surrogates.learnt_torque import ARM, torque_evaluator, torques
+from palpate.surrogates.lumps import Lump, LumpContrast
+from palpate.surrogates.lumps.lump_units import energy_with_lumps
 from palpate.surrogates.memories import Memory, Patches
+from palpate.surrogates.memories.friction import MINDLIN
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.surrogates.moving_rest import Followed, follow
+from palpate.surrogates.tool_friction import with_friction
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["KIND", "Surrogate", "correction_count", "correction_warning"]
@@ -67,6 +72,8 @@ class Surrogate:
         there.
     quantities : mapping of name to LearntQuantities
         Numbers of the inputs, each group learnt together; may be empty.
+    lumps : LumpContrast, optional
+        What hidden lumps would add to the energy, for `with_lumps`.
 
     Raises
     ------
@@ -80,6 +87,7 @@ class Surrogate:
     memory: Memory | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
     quantities: Mapping[str, LearntQuantities] = field(default_factory=dict)
+    lumps: LumpContrast | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fields", dict(self.fields))
@@ -189,6 +197,31 @@ class Surrogate:
                 fix="Ask it for its numbers and fields: `palpate ask FILE --at …`, or surrogate.predict(X).",
             )
         return self.energy
+
+    @property
+    def torque_evaluator(self) -> Callable[..., None] | None:
+        """A new evaluator of the torque on the tool, one place at a time; None of a body that tells none.
+
+        Called with a place (3,), further inputs (p,) and the force (3,) there, it renews its ``torque`` (3,), N m.
+        """
+        return None if self.energy is None else torque_evaluator(self.energy, self.quantities.get(ARM))
+
+    def torque(self, X: np.ndarray) -> np.ndarray:
+        """Return the torque (N, 3) on the tool about its place at inputs X (N, n), N m, in the body's axes.
+
+        Raises
+        ------
+        UsageError
+            If the body tells none: a ball feels no torque about its centre.
+        """
+        evaluator = self.torque_evaluator
+        if evaluator is None:
+            raise UsageError(
+                f"{self.name!r} tells no torque.",
+                why="It was learnt from solves without one, such as those under a ball.",
+                fix="Sweep under a pp.SurfaceTool, and learn from 20 solves or more.",
+            )
+        return torques(self.hand_energy, evaluator, X)
 
     @property
     def _remembers(self) -> str:
@@ -331,6 +364,58 @@ class Surrogate:
         """
         if memory is not None and spacing is not None:
             memory = memory.spread(self._patches(spacing), spacing)
+        return replace(self, memory=memory)
+
+    def with_lumps(self, lumps: Iterable[Lump]) -> Surrogate:
+        """Return the body with hidden lumps: what a hand feels of it changes, what is drawn and remembered does not.
+
+        The energy of the lumps is added to that of the body, which holds while they are apart. The new body has
+        further units in its network and is evaluated, saved and exported as any other; its file holds the lumps as
+        numbers that whoever opens it can read.
+
+        Parameters
+        ----------
+        lumps : iterable of Lump
+            Balls in the room that ``self.lumps.room`` tells; none for the body without.
+
+        Raises
+        ------
+        UsageError
+            If the body was not learnt with lumps, or one leaves its room or the skin, or two meet.
+        """
+        chosen = tuple(lumps)
+        if self.lumps is None:
+            raise UsageError(
+                f"{self.name!r} knows nothing of lumps.",
+                why="It was learnt from presses whose strain energy was not looked up.",
+                fix="Sweep a `palpate.LumpProblem` and learn that.",
+            )
+        hidden = [[*lump.place, lump.radius, lump.ratio] for lump in chosen]
+        energy = energy_with_lumps(self.hand_energy, self.lumps, chosen)
+        return replace(self, energy=energy, lumps=None, meta={**self.meta, "lumps": hidden})
+
+    def with_friction(
+        self, kinetic: float, static: float | None = None, *, ratio: float = MINDLIN
+    ) -> Surrogate:
+        """Return the same body under a tool that sticks and slides, in the loop, on the page and in exports.
+
+        Parameters
+        ----------
+        kinetic : float
+            Coefficient of friction of a tool that slides, a pure number; 0.3 for a dry tool on silicone, 0.05 for a
+            wet one on tissue, 0 for none.
+        static : float, optional
+            The same of a tool at rest, at least the kinetic one, which it is by default.
+        ratio : float
+            Tangential over normal stiffness of the contact while it sticks, in (0, 1]; by default Mindlin's for an
+            incompressible body, 2(1 − ν)/(2 − ν) = 2/3.
+
+        Raises
+        ------
+        UsageError
+            For a negative coefficient, a kinetic one above the static one, or a body that is held.
+        """
+        memory = with_friction(self.hand_energy, self.memory, kinetic, static, ratio=ratio)
         return replace(self, memory=memory)
 
     def follow(self, X: np.ndarray, times: np.ndarray | None = None) -> Followed:

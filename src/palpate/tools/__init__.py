@@ -3,14 +3,29 @@
     tool_shape    the base of all tools, and the functions that their distances are made of
     round_tools   Sphere, Capsule, Fingertip, Cone
     edged_tools   Punch, Cylinder, Box
-    posed_tool    a tool in an orientation, and how it is written to files
+    rotations     rotation vectors, their matrices and how turns follow from their changes
+    posed_tool    a tool in an orientation, its pose by its inputs, and how it is written to files
 
 A tool's own frame has its origin in the tool's centre. The tool points along −z: its foremost point is (0, 0, −front).
 """
 
 from palpate.tools.edged_tools import Box, Cylinder, Punch
-from palpate.tools.posed_tool import PosedTool
+from palpate.tools.posed_tool import PosedTool, Turns
+from palpate.tools.rotations import left_jacobian, rotation_matrix
 from palpate.tools.round_tools import Capsule, Cone, Fingertip, Sphere
 from palpate.tools.tool_shape import Tool
 
-__all__ = ["Box", "Capsule", "Cone", "Cylinder", "Fingertip", "PosedTool", "Punch", "Sphere", "Tool"]
+__all__ = [
+    "Box",
+    "Capsule",
+    "Cone",
+    "Cylinder",
+    "Fingertip",
+    "PosedTool",
+    "Punch",
+    "Sphere",
+    "Tool",
+    "Turns",
+    "left_jacobian",
+    "rotation_matrix",
+]

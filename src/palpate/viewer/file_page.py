@@ -127,6 +127,8 @@ class _Page:
         place = model.body.workspace(traits.radius)
         most = min(traits.max_force, model.body.meta.get("runtime", {}).get("max_force", math.inf))
         hello = model.hello(_Settings(place.scale, place.radius, most), RATE)
+        # the friction of a file is that of its weights
+        hello = replace(hello, parameters=hello.parameters[: len(surrogate.parameters)])
         if model.body.line is not None:
             return cls._of_line(surrogate, model.body.line, hello)
         assert model.surface is not None

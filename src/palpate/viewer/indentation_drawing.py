@@ -24,7 +24,7 @@ class _Depths:
 
     def __init__(self, body: Touchable) -> None:
         self._energy, self._radius = body.energy, body.radius
-        self._further = np.array([(r.low + r.high) / 2.0 for r in body.parameters])
+        self._further = np.array([(r.low + r.high) / 2.0 for r in body.energy.parameters])
         # denser towards the surface, where the amplitude rises as a power of the depth
         self._levels = BEYOND * body.deepest * np.linspace(0.0, 1.0, LEVELS) ** 2
 

@@ -111,6 +111,7 @@ class ViewerOptions(ServerOptions, total=False):
     unsoftened: bool
     controller: bool
     dead_man: bool
+    friction: float | None
 
 
 class Viewer(LocalServer):
@@ -144,6 +145,8 @@ class Viewer(LocalServer):
         Whether the passivity controller may damp.
     dead_man : bool
         Whether the force acts only while the device's first button is held.
+    friction : float, optional
+        Coefficient of friction of the tool on the body, a pure number; by default that of the body's own.
 
     Attributes
     ----------
@@ -172,6 +175,7 @@ class Viewer(LocalServer):
         unsoftened: bool = False,
         controller: bool = True,
         dead_man: bool = False,
+        friction: float | None = None,
         **server: Unpack[ServerOptions],
     ) -> None:
         super().__init__(**server)
@@ -180,6 +184,8 @@ class Viewer(LocalServer):
             self.model = load_touchable(model)
         else:
             self.model = touchable(model)
+        if friction is not None:
+            self.model = self.model.with_friction(friction)
         self._loop = functools.partial(
             LoopProcess,
             device=device,
@@ -189,6 +195,7 @@ class Viewer(LocalServer):
             unsoftened=unsoftened,
             controller=controller,
             dead_man=dead_man,
+            friction=friction,
         )
         self._hand = HandKind.RECORDING if replay is not None else hand_kind(device)
         self._device = device

@@ -110,16 +110,16 @@ PP_PART int pp_find(const unsigned char *bytes, uint64_t size, const unsigned ch
   return 1;
 }
 
-PP_PART int pp_net_fits(const pp_array *net, int32_t n, int32_t felt) {
+PP_PART int pp_net_fits(const pp_array *net, int32_t n, int32_t felt, int32_t outputs) {
   const int32_t *sizes = net[PP_SIZES].whole;
   int32_t i, groups;
   if (!pp_is(&net[PP_SIZES], 7, 1, 0) || sizes[0] != n || n < 1 || n > PP_MOST) return 0;
   if (sizes[1] < 0 || sizes[1] > PP_MOST * PP_MOST || sizes[2] < 0 || sizes[2] > PP_MOST || sizes[3] < 0) return 0;
-  if (sizes[4] != 1 || sizes[5] < 0 || sizes[5] > 2 || sizes[6] != felt * (felt + 1) / 2) return 0;
-  if (!pp_is(&net[PP_SCALES], 2, n, 1) || !pp_dense(&net[PP_TAIL]) || net[PP_TAIL].n[0] < 1 + n) return 0;
+  if (sizes[4] != outputs || sizes[5] < 0 || sizes[5] > 2 || sizes[6] != felt * (felt + 1) / 2) return 0;
+  if (!pp_is(&net[PP_SCALES], 2, n, 1) || !pp_dense(&net[PP_TAIL]) || net[PP_TAIL].n[0] < (1 + n) * outputs) return 0;
   groups = (sizes[3] + PP_LANES - 1) / PP_LANES;
   if (groups == 0) return net[PP_UNITS].n[0] == 0;
-  if (!pp_is(&net[PP_UNITS], groups, sizes[1] + sizes[2] + sizes[6] + 1, 1) || net[PP_UNITS].n[2] != PP_LANES) return 0;
+  if (!pp_is(&net[PP_UNITS], groups, sizes[1] + sizes[2] + sizes[6] + outputs, 1) || net[PP_UNITS].n[2] != PP_LANES) return 0;
   if (sizes[1] == 0) return 1;
   if (!pp_is(&net[PP_LAYOUT], sizes[1], 2, 0)) return 0;
   for (i = 0; i < sizes[1]; i++) {
@@ -161,29 +161,45 @@ PP_PART int pp_baseline_fits(const pp_array *a, const int32_t *head) {
   return own[3].n[0] == 0 || pp_dense(&own[3]);
 }
 
-PP_PART int pp_memory_fits(const pp_array *a, const int32_t *head) {
-  const pp_array *own = a + PP_MEMORY;
-  const int32_t code = head[PP_MEMORY_CODE], points = own[code == 2 ? 3 : 0].n[0];
+/* how many numbers a memory's state has after its ledger; -1 where its arrays do not fit */
+PP_PART int32_t pp_memory_size(const pp_array *own, int32_t code) {
+  const int32_t points = own[code == 2 ? 3 : code == 4 ? 10 : 0].n[0];
   int32_t i, size = 0;
-  if (code == 0) return head[PP_STATE] == 0;
+  if (points < 1 || points >= (1 << 22)) return -1;
+  if (code == 4) { /* friction, on what the body itself remembers */
+    int32_t below = 0;
+    if (!pp_is(&own[10], points, 1, 1) || !pp_is(&own[11], 6, 1, 1)) return -1;
+    if (own[11].real[5] != 0.0 && own[11].real[5] != 1.0 && own[11].real[5] != 2.0) return -1;
+    if (own[11].real[5] != 0.0) {
+      below = pp_memory_size(own, (int32_t)own[11].real[5]);
+      if (below < 0) return -1;
+      below += 4;
+    }
+    return 6 + 3 * points + below;
+  }
   if (code == 1) {
     const int32_t n = own[2].n[0];
-    if (!pp_is(&own[0], points, 3, 1) || !pp_is(&own[1], 3, 1, 1) || !pp_dense(&own[4]) || points > 100000 || n > 100) return 0;
-    if (n > 0 && (!pp_is(&own[2], n, 1, 1) || !pp_is(&own[3], n, 1, 1))) return 0;
+    if (!pp_is(&own[0], points, 3, 1) || !pp_is(&own[1], 3, 1, 1) || !pp_dense(&own[4]) || points > 100000 || n > 100) return -1;
+    if (n > 0 && (!pp_is(&own[2], n, 1, 1) || !pp_is(&own[3], n, 1, 1))) return -1;
     size = 1 + points * (3 + n) + 3 * n;
   } else if (code == 2) {
     for (i = 0; i < 3; i++) {
-      if (!pp_is(&own[i], own[0].n[0], 1, 1) || own[i].n[0] < 2) return 0;
+      if (!pp_is(&own[i], own[0].n[0], 1, 1) || own[i].n[0] < 2) return -1;
     }
-    if (!pp_is(&own[3], points, 3, 1) || !pp_dense(&own[4])) return 0;
+    if (!pp_is(&own[3], points, 3, 1) || !pp_dense(&own[4])) return -1;
     size = 2 * points;
   } else {
     for (i = 0; i < 4; i++) {
-      if (!pp_is(&own[i], points, 1, 1)) return 0;
+      if (!pp_is(&own[i], points, 1, 1)) return -1;
     }
     size = 1 + 2 * points;
   }
-  return points > 0 && points < (1 << 22) && size == head[PP_STATE];
+  return size;
+}
+
+PP_PART int pp_memory_fits(const pp_array *a, const int32_t *head) {
+  const int32_t code = head[PP_MEMORY_CODE];
+  return head[PP_STATE] == (code == 0 ? 0 : pp_memory_size(a + PP_MEMORY, code));
 }
 
 /* Open a block into PP_ARRAYS arrays that the caller owns; PP_OPEN, or why not. */
@@ -202,10 +218,11 @@ PP_PART int pp_open(const unsigned char *bytes, uint64_t size, pp_array *arrays)
   n = head[PP_INPUTS];
   k = head[PP_FELT];
   if (head[PP_BASELINE_CODE] < 1 || head[PP_BASELINE_CODE] > 4) return PP_UNKNOWN;
-  if (head[PP_MEMORY_CODE] < 0 || head[PP_MEMORY_CODE] > 3) return PP_UNKNOWN;
+  if (head[PP_MEMORY_CODE] < 0 || head[PP_MEMORY_CODE] > 4) return PP_UNKNOWN;
   if (n < 1 || n > PP_MOST || k < 1 || k > 3 || k > n || head[PP_RADIUS_INPUT] >= n) return PP_MISFIT;
   if (!pp_is(&arrays[PP_NUMBERS], 5, 1, 1) || !pp_is(&arrays[PP_LIMITS], 3, n, 1)) return PP_MISFIT;
-  if (!pp_is(&arrays[PP_AXES], k, 3, 1) || !pp_net_fits(arrays + PP_NET, n, k)) return PP_MISFIT;
+  if (!pp_is(&arrays[PP_AXES], k, 3, 1) || !pp_net_fits(arrays + PP_NET, n, k, 1)) return PP_MISFIT;
+  if (arrays[PP_ARM].n[0] > 0 && (k != 3 || !pp_net_fits(arrays + PP_ARM, n, 0, 3))) return PP_MISFIT;
   if (arrays[PP_POINTS].n[0] > 0 && (!pp_is(&arrays[PP_POINTS], n, arrays[PP_POINTS].n[1], 1) ||
                                      arrays[PP_POINTS].n[1] % PP_LANES)) return PP_MISFIT;
   if (!pp_baseline_fits(arrays, head) || !pp_memory_fits(arrays, head)) return PP_MISFIT;

@@ -80,6 +80,11 @@ class MemoryState(ABC):
         """Energy turned into heat in the last step, J; never negative."""
         return float(self._ledger[STEP])
 
+    @property
+    def of_body(self) -> MemoryState | None:
+        """The state of what the body itself remembers: this one, unless it is of a tool's friction on the body."""
+        return self
+
     @abstractmethod
     def reset(self) -> None:
         """Forget everything: the body is as at the start, and nobody touches it. Here: no force, an empty ledger."""
@@ -136,6 +141,11 @@ class Memory(ABC):
     @abstractmethod
     def start(self) -> MemoryState:
         """Return the state of a body that nothing has been done to."""
+
+    @property
+    def of_body(self) -> Memory | None:
+        """What the body itself remembers: this memory, unless it is of a tool's friction on the body."""
+        return self
 
     def carry_from(self, other: Memory) -> Carry:
         """Return how a state of this memory takes over what a state of `other` remembers, as amplitudes in √J.

@@ -35,7 +35,7 @@ def courses():
 
 @pytest.mark.parametrize("name", courses())
 def test_intervals_hold_the_truth(name):
-    people = 300
+    people = 150
     result = simulate_course(courses()[name], PERSON, people, seed=7)
     chance = 3.0 * math.sqrt(0.05 * 0.95 / people)  # of a share that is 0.95
     assert result.spread_coverage == pytest.approx(0.95, abs=chance)
@@ -45,7 +45,7 @@ def test_intervals_hold_the_truth(name):
 
 def test_the_bias_of_a_staircase_is_told():
     course = Course(Staircase(np.geomspace(0.02, 0.6, 16)), FUNCTION, 80)
-    result = simulate_course(course, Observer(lapse=0.02), 100, seed=1)
+    result = simulate_course(course, Observer(lapse=0.02), 40, seed=1)
     assert result.reversals_bias is not None
     assert f"{result.reversals_bias:+.1%}" in str(result)
 
@@ -90,8 +90,8 @@ def test_equivalence_keeps_its_level_and_is_shown_where_it_is_true():
 
 def test_power_grows_with_people_and_falls_with_the_shift():
     course = Course(Constant(np.linspace(-0.5, 0.5, 7), 56), FUNCTION, 56)
-    same = power_curve(course, Population(Observer()), np.array([4, 16]), people=150)
-    apart = power_curve(course, Population(Observer(location=0.13)), np.array([16]), people=150)
+    same = power_curve(course, Population(Observer()), np.array([4, 16]), people=80)
+    apart = power_curve(course, Population(Observer(location=0.13)), np.array([16]), people=80)
     assert same[0] < same[1]
     assert apart[0] < 0.05 < same[1]
 

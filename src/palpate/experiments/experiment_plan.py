@@ -75,7 +75,7 @@ class Placed(Record):
     """How levels are chosen."""
 
     kind: Literal["adaptive", "constant", "staircase"] = "adaptive"
-    trials: Count = Field(default=80, ge=10, le=2000)  # counted ones, of each condition
+    trials: Count = Field(default=80, ge=2, le=2000)  # counted ones, of each condition
     down: Count = Field(default=2, ge=1, le=6)  # of a staircase: right answers in a row before it goes down
     step_up: Count = Field(default=1, ge=1, le=50)  # of a staircase, in levels
     step_down: Count = Field(default=1, ge=1, le=50)

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -40,6 +40,7 @@ _FINER = 8  # points of a marginal between two nodes of the grid
 _SHOWN, _FINE = (0, 1, 2, 4), (0, 1, 4)  # axes with a marginal: μ, ln σ, λ, b; and those made finer
 _COARSE = 0.5  # steps of a grid: a posterior narrower than that is not drawn by it
 _REFINEMENTS = 6
+_COARSE_POINTS = 19  # of a grid on which hundreds of repetitions are fitted
 _LEAST = 1e-9  # probability that is never certain
 
 
@@ -255,7 +256,7 @@ class Psychometric:
             marginals, best = self._marginals(own, axes)
         return axes, marginals, best[0]
 
-    def goodness(self, answers: Answers, seed: int = 0, repeats: int = 500) -> Goodness:
+    def goodness(self, answers: Answers, seed: int = 0, repeats: int = 200) -> Goodness:
         """Return the deviance of the first person's answers, and its p-value by so many simulated repetitions.
 
         Each repetition has the same stimuli, answers of the most likely function, and is fitted anew. Of adaptively
@@ -266,7 +267,8 @@ class Psychometric:
         own = Answers(level, order, answers.yes[:1, asked], total)
         if len(np.unique(level)) < 2:
             return Goodness(0.0, 1.0)
-        on, off = self._log_probabilities(own, self.axes(own.level))
+        coarse = replace(self, points=_COARSE_POINTS)  # the same for the answers and their repetitions
+        on, off = coarse._log_probabilities(own, coarse.axes(own.level))
         best = int((own.yes @ on + (total - own.yes) @ off)[0].argmax())
         rng = np.random.default_rng(seed)
         drawn = rng.binomial(total[0].astype(int), np.exp(on[:, best]), (repeats, len(level))).astype(float)

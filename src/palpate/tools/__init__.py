@@ -3,6 +3,7 @@
     tool_shape    the base of all tools, and the functions that their distances are made of
     round_tools   Sphere, Capsule, Fingertip, Cone
     edged_tools   Punch, Cylinder, Box
+    scanned_tool  ScannedTool, of the file of a surface: `palpate.read_tool` makes it
     posed_tool    a tool in an orientation, and how it is written to files
 
 A tool's own frame has its origin in the tool's centre. The tool points along −z: its foremost point is (0, 0, −front).
@@ -11,6 +12,18 @@ A tool's own frame has its origin in the tool's centre. The tool points along �
 from palpate.tools.edged_tools import Box, Cylinder, Punch
 from palpate.tools.posed_tool import PosedTool
 from palpate.tools.round_tools import Capsule, Cone, Fingertip, Sphere
+from palpate.tools.scanned_tool import ScannedTool
 from palpate.tools.tool_shape import Tool
 
-__all__ = ["Box", "Capsule", "Cone", "Cylinder", "Fingertip", "PosedTool", "Punch", "Sphere", "Tool"]
+__all__ = [
+    "Box",
+    "Capsule",
+    "Cone",
+    "Cylinder",
+    "Fingertip",
+    "PosedTool",
+    "Punch",
+    "ScannedTool",
+    "Sphere",
+    "Tool",
+]

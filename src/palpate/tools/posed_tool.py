@@ -14,12 +14,13 @@ from palpate import checks
 from palpate.errors import UsageError
 from palpate.tools.edged_tools import Box, Cylinder, Punch
 from palpate.tools.round_tools import Capsule, Cone, Fingertip, Sphere
+from palpate.tools.scanned_tool import ScannedTool
 from palpate.tools.tool_shape import Tool
 
 __all__ = ["PosedTool"]
 
 SHAPES: dict[str, type[Tool]] = {
-    shape.__name__: shape for shape in (Box, Capsule, Cone, Cylinder, Fingertip, Punch, Sphere)
+    shape.__name__: shape for shape in (Box, Capsule, Cone, Cylinder, Fingertip, Punch, ScannedTool, Sphere)
 }
 
 

@@ -33,6 +33,7 @@ BENCHMARKS = (
     "heated_plate",
     "latency",
     "literature",
+    "many_cases",
     "mujoco_flex",
     "newton_balls",
     "online",

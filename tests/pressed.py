@@ -108,19 +108,25 @@ def solves(X: np.ndarray | None = None) -> TouchSolves:
 
 
 def dataset(
-    test: TouchSolves, *, radius: float = RADIUS, acting: Any = None, inputs: tuple[Range, ...] = INPUTS
+    test: TouchSolves,
+    *,
+    radius: float = RADIUS,
+    acting: Any = None,
+    inputs: tuple[Range, ...] = INPUTS,
+    torque: np.ndarray | None = None,
 ) -> Dataset:
     """The same solves as a sweep would store them, by default those of a ball; `acting` describes another tool."""
     rest = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -1]])
     triangles = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
     layout = Layout(rest, triangles=triangles, surfaces=("top", "side"), surface_of=[0, 1, 1, 1])
-    count, schema = len(test), solid_fields(len(rest), inputs)
+    count, schema = len(test), solid_fields(len(rest), inputs, torque=torque is not None)
     answers = {field.name: np.zeros((count, *field.shape)) for field in schema}
     answers |= {
         "response": test.force,
         "potential_energy": test.energy,
         "response_gradient": test.stiffness,
     }
+    answers |= {} if torque is None else {"torque": torque}
     said = {"converged": True, "iterations": 3, "residual": 0.0, "message": "", "solve_seconds": 1.0}
     answers |= {name: np.full(count, value) for name, value in said.items()}
     origin = {"problem": {"interactions": [acting or {"type": "SphereProbe", "radius": radius}]}}

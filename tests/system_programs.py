@@ -10,10 +10,13 @@ from typing import Any, NoReturn
 import pytest
 
 
-def require_program(*names: str) -> str:
-    """Path of the first system program found; skips by name where none is, fails where CI promised it."""
+def require_program(*names: str, path: str | None = None) -> str:
+    """Path of the first system program found; skips by name where none is, fails where CI promised it.
+
+    They are looked for in `path`, by default the user's own.
+    """
     for name in names:
-        if path := shutil.which(name):
+        if path := shutil.which(name, path=path):
             return path
     return _go_without(f"needs the system program {' or '.join(names)}")
 

@@ -47,8 +47,10 @@ from .study import Study as Study
 from .study import preset_study as preset_study
 from .study import read_study as read_study
 from .surrogates import Baseline as Baseline
+from .surrogates import Lump as Lump
 from .surrogates import Surrogate as Surrogate
 from .surrogates import register_baseline as register_baseline
+from .surrogates.shipped_bodies import shipped_body as shipped_body
 from .sweeps import ExternalProblem as ExternalProblem
 from .sweeps import Space as Space
 from .sweeps import local_cluster as local_cluster

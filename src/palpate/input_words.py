@@ -11,6 +11,7 @@ _WORDS = (
     (r"d_([xyz])(_\d+)?", r"pad moved along \1"),
     (r"p_([xyz])(_\d+)?", r"pad's place along \1"),
     (r"tip_([xyz])(_\d+)?", r"tool's foremost point along \1"),
+    (r"tip_r([xyz])(_\d+)?", r"tool's turn about \1"),
     (r"P", "force"),
     (r"P_([xyz])", r"force along \1"),
     (r"P_([\d.]+)m", "force at \\1\N{NO-BREAK SPACE}m"),

@@ -404,6 +404,11 @@ class PartOptions(Options):
         "size of elements under the ball, such as 3 mm; or auto: smaller ones where finer solves show that it pays. "
         "Default: by the part's size",
     )
+    tool: str | None = option(
+        None,
+        "what presses: ball, sphere, capsule, cylinder, punch, cone, box or fingertip, with sizes, such as "
+        "'punch, radius 6 mm, edge 2 mm'. Default: a ball",
+    )
     held: tuple[str, ...] = option(
         (), "surface of the file that is held. Several times. Default: what it stands on"
     )

@@ -22,6 +22,7 @@ __all__ = [
     "Pair",
     "Pascals",
     "QuarticMetres",
+    "Radians",
     "Record",
     "SquareMetres",
     "Stiffness",
@@ -78,6 +79,7 @@ def in_si(value: Any, unit: str | None) -> float:
 Count = Annotated[int, _Whole()]
 Number = Annotated[float, Unit("")]
 Metres = Annotated[float, Unit("m")]
+Radians = Annotated[float, Unit("rad")]
 SquareMetres = Annotated[float, Unit("m^2")]
 QuarticMetres = Annotated[float, Unit("m^4")]
 Newtons = Annotated[float, Unit("N")]

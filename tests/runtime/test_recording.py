@@ -165,7 +165,7 @@ def test_faults_are_replayed_as_they_came(name, tmp_path):
 
 def test_every_slot_of_a_sample_is_recorded():
     """One that the loop learns to heed must be recorded too, or a replay goes its own way."""
-    figures = {"position", "time", "patience", "holding", "clutched", "asleep"}
+    figures = {"position", "orientation", "time", "patience", "holding", "clutched", "asleep"}
     as_flags = {"buttons", "stop"}  # what they ask for: stopped, released
     assert set(Sample.__slots__) == figures | as_flags
 

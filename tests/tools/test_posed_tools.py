@@ -13,6 +13,7 @@ from palpate.errors import UsageError
 from palpate.physics import Body, SphereProbe, SurfaceTool
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block
+from palpate.tools import left_jacobian
 
 BODY = Body(Block((0.04, 0.04, 0.02), element=0.02), NeoHookean(9e3, 0.45))
 FOOT = (0.020, 0.021)
@@ -30,7 +31,7 @@ def on_block(tool, fine=None):
     """Problem of a tool on the block, and its place at the depth."""
     tool = replace(tool, depth=(0.0, 0.003), over=((0.019, 0.020), (0.021, 0.022)), element=0.004, pad=2e7)
     problem = BODY.problem(tool)
-    place = np.array([*FOOT, 0.02 - DEPTH + float(tool.offset(UP)[0])])
+    place = np.array([*FOOT, 0.02 - DEPTH + float(tool.posed_tool.offset(UP)[0])])
     return replace(problem, fine=fine or problem.refinements), place
 
 
@@ -73,11 +74,35 @@ def slope(energies, step):
 
 
 @pytest.mark.full
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("turns", ["axis", "full"])
+def test_responses_to_angles_are_derivatives_of_the_energy(turns):
+    """By fourth-order differences along all inputs at once; the torque does the same work along the angles."""
+    problem, place = on_block(replace(POSED["capsule"], turns=turns, tilt=0.3))
+    angles = np.array([0.1, -0.15, 0.2])[: 2 if turns == "axis" else 3]
+    x, solver = np.append(place, angles), problem.open()
+    x[2] += 0.001
+    here = solver.solve(x)
+    along = np.append([1e-5, -1.2e-5, 0.7e-5], [1e-3, -0.7e-3, 0.6e-3][: angles.size])
+    found = {many: solver.solve(x + many * along) for many in (-2, -1, 1, 2)}
+    energies = {many: one.potential_energy for many, one in found.items()}
+    size = np.abs(here.response) @ np.abs(along)
+    assert -slope(energies, 1.0) == pytest.approx(here.response @ along, abs=1e-5 * size)
+    turn = left_jacobian(np.append(angles, np.zeros(3 - angles.size)))
+    np.testing.assert_allclose((turn.T @ here.torque)[: angles.size], here.response[3:], rtol=1e-6, atol=1e-9)
+    # points of the contact's rule come and go: along a way so short that few do
+    ends = [solver.solve(x + sign * 1e-2 * along).response for sign in (1, -1)]
+    change = here.response_gradient @ along
+    np.testing.assert_allclose((ends[0] - ends[1]) / 2e-2, change, atol=0.01 * np.abs(change).max())
+    np.testing.assert_allclose(here.force, here.response[:3])
+
+
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["punch", "cone"])
 def test_a_tool_of_revolution_has_no_torque_about_its_axis(name):
     problem, place = on_block(POSED[name])
     found = problem.solve(place)
-    axis = problem.interactions[0].turn @ [0.0, 0.0, 1.0]
+    axis = problem.interactions[0].posed_tool.turn @ [0.0, 0.0, 1.0]
     assert abs(found.torque @ axis) < 1e-3 * np.linalg.norm(found.response) * 1e-3
 
 
@@ -119,7 +144,7 @@ def test_places_touch_the_surface_at_the_least_depth_and_fit_into_their_ranges()
     points = 0.02 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
     for _ in range(4):
         points = points - tool.shape.distance(points)[:, None] * tool.shape.gradient(points)
-    lowest = (points @ tool.turn.T)[:, 2].min() + tool.to_centre[2]
+    lowest = (points @ tool.posed_tool.turn.T)[:, 2].min() + tool.posed_tool.to_centre[2]
     depths = 0.02 - (places[:, 2] + lowest)
     assert depths.min() > 0.001 - 2e-5
     assert depths.max() < 0.003 + 1e-9
@@ -127,6 +152,26 @@ def test_places_touch_the_surface_at_the_least_depth_and_fit_into_their_ranges()
     assert (places >= low - 1e-12).all()
     assert (places <= high + 1e-12).all()
     assert [r.name for r in problem.ranges] == ["tip_x", "tip_y", "tip_z"]
+
+
+def test_a_design_of_poses_keeps_its_depths_and_chains_in_one_orientation():
+    tool = replace(
+        POSED["capsule"], turns="axis", tilt=0.3, depth=(0.001, 0.003), over=((0.015, 0.015), (0.025, 0.025))
+    )
+    problem = BODY.problem(tool)
+    rows = problem.design(12)
+    depths = 0.02 + tool.offset(np.tile(UP, (len(rows), 1)), rows[:, 3:]) - rows[:, 2]
+    assert depths.min() > 0.001 - 1e-9
+    assert depths.max() < 0.003 + 1e-9
+    low, high = np.array([(r.low, r.high) for r in problem.ranges]).T
+    assert (rows >= low - 1e-12).all()
+    assert (rows <= high + 1e-12).all()
+    chains = problem.chains(rows)
+    np.testing.assert_array_equal(np.sort(np.concatenate(chains)), np.arange(len(rows)))
+    for chain in chains:
+        assert len(chain) > 1
+        assert np.ptp(rows[chain, 3:], axis=0).max() == 0
+        assert (np.diff(rows[chain, 2]) < 0).all()
 
 
 def test_its_hash_follows_from_its_shape_and_pose():

@@ -39,6 +39,7 @@ class Answer:
     # how far inside the touched surface (m) the probe's centre could go, where the loop lets go of it; energy, force
     # and stiffness are not-a-number there
     deepest: float | None = None
+    torque: np.ndarray | None = None  # (3,) in N m about the tool's place; None of a probe that tells none
 
     def words(self, names: Sequence[Range]) -> str:
         """Return the answer as lines for a person."""
@@ -53,6 +54,7 @@ class Answer:
         lines = [
             place,
             f"  force      {_row(self.force, size)} N, in all {size:.4g} N",
+            *self._torque_in_words(),
             f"  stiffness  {self.along():.4g} N/m along the force",
             f"  ∂F/∂c      {'; '.join(_row(row, largest) for row in self.stiffness)} N/m",
             f"  energy     {self.energy:.4g} J",
@@ -63,6 +65,12 @@ class Answer:
     def along(self) -> float:
         """Return −F·(∂F/∂c)F/‖F‖², N/m: the stiffness that a hand feels when it pushes on."""
         return float(-self.force @ self.stiffness @ self.force / (self.force @ self.force))
+
+    def _torque_in_words(self) -> list[str]:
+        if self.torque is None:
+            return []
+        size = float(np.linalg.norm(self.torque))
+        return [f"  torque     {_row(1e3 * self.torque, 1e3 * size)} mN m about the tool's foremost point"]
 
     def _trust(self, names: Sequence[Range]) -> str:
         where = _trust_in_words(self.inputs, names, inside=self.inside)
@@ -80,6 +88,7 @@ class Answer:
             force=np.full(3, none),
             stiffness=np.full((3, 3), none),
             deviation=none,
+            torque=None if self.torque is None else np.full(3, none),
             inside=False,
             deepest=deepest,
         )
@@ -92,6 +101,7 @@ class Answer:
         return {
             "inputs": self.inputs.tolist(),
             "force": self.force.tolist(),
+            **({} if self.torque is None else {"torque": self.torque.tolist()}),
             "stiffness": self.stiffness.tolist(),
             "energy": self.energy,
             "deviation": self.deviation,

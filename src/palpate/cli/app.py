@@ -11,7 +11,9 @@ import typer
 from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.device_commands import devices_app
+from palpate.cli.exam_command import exam
 from palpate.cli.exchange_commands import card, export_dataset
+from palpate.cli.experiment_commands import experiment_app
 from palpate.cli.export_commands import export_app
 from palpate.cli.init_command import init
 from palpate.cli.material_commands import material_app
@@ -43,6 +45,7 @@ app.add_typer(devices_app, name="devices")
 app.add_typer(material_app, name="material")
 app.add_typer(trace_app, name="trace")
 app.add_typer(export_app, name="export")
+app.add_typer(experiment_app, name="experiment")
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file, as [bold]palpate init[/] writes it.")]
 ModelFile = Annotated[
@@ -338,6 +341,7 @@ def run(
 
 app.command()(replay)
 app.command()(touch)
+app.command()(exam)
 app.command()(fit)
 app.command()(correct)
 app.command()(card)

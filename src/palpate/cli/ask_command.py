@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +98,8 @@ def answers_at(body: Surrogate, X: np.ndarray) -> list[Answer]:
     answers = [
         Answer(x, float(U), F, K, float(d), bool(i)) for x, U, F, K, d, i in zip(X, *columns, strict=True)
     ]
+    if body.torque_evaluator is not None:
+        answers = [replace(one, torque=t) for one, t in zip(answers, body.torque(X), strict=True)]
     if energy.baseline.surface is None:
         return answers
     let_go, end = _let_go(body, X), energy.baseline.inner

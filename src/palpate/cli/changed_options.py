@@ -21,6 +21,7 @@ _KEYS = {
     "poisson": ("body", "material", "poisson"),
     "radius": ("interaction", "radius"),
     "depth": ("interaction", "depth"),
+    "tool": ("interaction", "shape", "kind"),
     "element": ("sweep", "element"),
     "held": ("body", "fixed"),
     "touched": ("interaction", "touches"),
@@ -36,6 +37,8 @@ def require_same(file: Path, study: Study, choices: PartOptions) -> None:
     stated = _choices_of(study)
     if choices.element is not None:  # what was measured once stays
         stated["element"] = _element_words(stated.get("element"), choices.element)
+    if choices.tool is not None:
+        stated["tool"] = _tool_words(study, choices.tool)
     differing = [
         name
         for name, keys in _KEYS.items()
@@ -59,14 +62,13 @@ def require_same(file: Path, study: Study, choices: PartOptions) -> None:
 
 def chosen_words(study: Study) -> str:
     """Return what was chosen for a part, in one sentence."""
-    from palpate.study.probe_kind import ProbeRecord
+    from palpate.study.tool_kind import ToolRecord
 
     acting, held = study.interaction, ", ".join(study.body.fixed_names())
-    assert isinstance(acting, ProbeRecord)
     held = "what it stands on" if held == "held" else held
     surface = "the surface that faces up" if acting.touches == "touched" else acting.touches
-    ball = f"a ball of {1e3 * acting.radius:g} mm"
-    return f"Held at {held}; {ball} presses {surface}, up to {1e3 * acting.depth[1]:g} mm deep."
+    tool = acting.build_tool() if isinstance(acting, ToolRecord) else f"ball of {1e3 * acting.radius:g} mm"
+    return f"Held at {held}; a {tool} presses {surface}, up to {1e3 * acting.depth[1]:g} mm deep."
 
 
 def _flag(name: str) -> str:
@@ -89,11 +91,14 @@ def _choices_of(study: Study) -> dict[str, Any]:
     from palpate.study.material_records import SolidMaterialRecord
     from palpate.study.part_records import PartRecord
     from palpate.study.probe_kind import ProbeRecord
+    from palpate.study.tool_kind import ToolRecord
 
     body, acting = study.body, study.interaction
-    if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord):
+    if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord | ToolRecord):
         return {}
-    said: dict[str, Any] = {"radius": acting.radius, "depth": acting.depth[1], "touched": acting.touches}
+    said: dict[str, Any] = {"depth": acting.depth[1], "touched": acting.touches}
+    if isinstance(acting, ProbeRecord):
+        said["radius"] = acting.radius
     said |= {"wrap": body.wrap, "unit": body.unit, "held": body.fixed_names()}
     said["element"] = getattr(study.sweep, "element", None)
     if isinstance(body.material, str):
@@ -111,6 +116,28 @@ def _element_words(stated: float | None, wanted: str) -> str:
     if wanted == AUTO:
         return wanted
     return wanted if _are_equal(stated, parse_quantity(wanted, "m", "--element", bare=False)) else ""
+
+
+def _tool_words(study: Study, wanted: str) -> str:
+    """Return the wanted tool as it was typed where a study states the same; sizes left out are as stated."""
+    from palpate.study.tool_kind import ToolRecord
+    from palpate.tools.tool_sizes import BALL, read_tool
+
+    acting = study.interaction
+    if not isinstance(acting, ToolRecord):
+        return wanted if wanted.strip().lower() == BALL else ""
+    stated = acting.build_tool()
+    return wanted if _same_tool(read_tool(wanted, stated.shape.size, stated)[1], stated) else ""
+
+
+def _same_tool(one: Any, other: Any) -> bool:
+    """Return whether two tools are the same; sizes may differ by the rounding of a unit."""
+    from palpate.tools.tool_sizes import sizes_of
+
+    if one is None or type(one.shape) is not type(other.shape):
+        return False
+    mine, theirs = sizes_of(one), sizes_of(other)
+    return all(math.isclose(mine[key], theirs[key], rel_tol=1e-9, abs_tol=1e-12) for key in mine)
 
 
 def _are_equal(one: Any, other: Any) -> bool:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from palpate.options import ImprovementOptions
     from palpate.study import Study
     from palpate.study.run import Outcome, Paths
-    from palpate.sweeps import Scheduler
+    from palpate.sweeps import JobQueue, Scheduler
 
 __all__ = ["improve_and_print", "improve_file", "mesh_in_words", "step_line", "trial_in_words"]
 
@@ -24,7 +24,7 @@ __all__ = ["improve_and_print", "improve_file", "mesh_in_words", "step_line", "t
 def improve_file(
     file: Path,
     options: ImprovementOptions,
-    scheduler: Scheduler | None,
+    scheduler: Scheduler | JobQueue | None,
     console: Console,
     *,
     refine: bool = False,

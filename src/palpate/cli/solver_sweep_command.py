@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from palpate.improvement import ImprovementStep
     from palpate.options import ImprovementOptions
     from palpate.study.solver_study import SolverStudy
-    from palpate.sweeps import Scheduler
+    from palpate.sweeps import JobQueue, Scheduler
 
 __all__ = ["SolverSweepOptions", "sweep_solver_file"]
 
@@ -29,7 +29,7 @@ class SolverSweepOptions:
     samples: int | None
     workers: int | None
     case_limit: float
-    scheduler: Scheduler | None
+    scheduler: Scheduler | JobQueue | None
     improvement: ImprovementOptions | None  # of --until
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from palpate.study import Study
-    from palpate.sweeps import Scheduler
+    from palpate.sweeps import JobQueue, Scheduler
     from palpate.validation.touch_comparison import TouchComparison
 
 __all__ = [
@@ -46,7 +46,7 @@ def sweep_file(
     study: Path,
     workers: int | None,
     console: Console,
-    scheduler: Scheduler | None = None,
+    scheduler: Scheduler | JobQueue | None = None,
     *,
     case_limit: float = CASE_LIMIT,
     samples: int | None = None,
@@ -114,7 +114,7 @@ def refine_elements(
     console: Console,
     *,
     workers: int | None = None,
-    scheduler: Scheduler | None = None,
+    scheduler: Scheduler | JobQueue | None = None,
 ) -> Study:
     """Return a study with elements of the size that finer solves choose, as its file says it afterwards.
 

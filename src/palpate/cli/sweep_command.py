@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,6 +14,9 @@ from palpate.cli.number_options import count_option, declared_option, number_opt
 from palpate.cli.table_options import Json, Verbose
 from palpate.errors import UsageError
 from palpate.options import ImprovementOptions
+
+if TYPE_CHECKING:
+    from palpate.sweeps import JobQueue, Scheduler
 
 __all__ = ["sweep"]
 
@@ -78,6 +82,17 @@ def sweep(
         Path | None,
         typer.Option(help="For --scheduler: the key of your certificate, if it has a PEM file of its own."),
     ] = None,
+    cluster: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Solve in jobs of a cluster's queue, which a TOML file describes: a table such as slurm, with jobs, "
+            "cores, memory and walltime.",
+        ),
+    ] = None,
+    status: Annotated[
+        bool, typer.Option("--status", help="Say how far the sweep is, and solve nothing.")
+    ] = False,
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> None:
@@ -88,20 +103,18 @@ def sweep(
     from palpate.cli.study_commands import sweep_file
     from palpate.study.part_study import AUTO
     from palpate.study.solver_study import says_solver
-    from palpate.sweeps import Scheduler
 
+    if status:
+        from palpate.cli.sweep_status import print_status
+
+        print_status(study, Console(as_json, verbose))
+        return
     if element not in {None, AUTO}:
         raise UsageError(
             f"--element {element} asks a sweep for elements of a size.",
             why="The study file states the size of its elements; only auto lets touches on two meshes decide it.",
             fix=f"Write it there, [sweep] element, or give --element {AUTO}.",
         )
-    if scheduler is not None:
-        own = Scheduler(scheduler, tls_ca, tls_cert, tls_key)
-    elif tls_ca or tls_cert or tls_key:
-        raise UsageError("Certificates belong to a scheduler.", fix="Give its address with --scheduler.")
-    else:
-        own = None
     if until is None and minutes is not None:
         raise UsageError(
             "A sweep of a design has no limit on time.", fix="Give --until, or leave --minutes out."
@@ -114,20 +127,46 @@ def sweep(
             until=until, limit=limit, most=most, workers=workers, case_limit=case_limit
         )
     refine = element is not None
-    if says_solver(study):
-        from palpate.cli.solver_sweep_command import SolverSweepOptions, sweep_solver_file
+    is_solver, console = says_solver(study), Console(as_json, verbose)
+    if is_solver and refine:
+        raise UsageError(
+            "The program of a study with [solver] makes its own mesh.", fix="Leave --element out."
+        )
+    with _machines(study, scheduler, (tls_ca, tls_cert, tls_key), cluster, console) as own:
+        if is_solver:
+            from palpate.cli.solver_sweep_command import SolverSweepOptions, sweep_solver_file
 
-        if refine:
+            sweep_solver_file(study, SolverSweepOptions(samples, workers, case_limit, own, options), console)
+        elif options is not None:
+            from palpate.cli.improvement_lines import improve_file
+
+            improve_file(study, options, own, console, refine=refine)
+        else:
+            sweep_file(study, workers, console, own, case_limit=case_limit, samples=samples, refine=refine)
+
+
+def _machines(
+    study: Path,
+    scheduler: str | None,
+    certificates: tuple[Path | None, Path | None, Path | None],
+    cluster: Path | None,
+    console: Console,
+) -> contextlib.AbstractContextManager[Scheduler | JobQueue | None]:
+    """Return what the options ask to solve on; None for this machine."""
+    from palpate.sweeps import JobQueue, Scheduler
+
+    if cluster is not None:
+        if scheduler is not None:
             raise UsageError(
-                "The program of a study with [solver] makes its own mesh.", fix="Leave --element out."
+                "--cluster and --scheduler ask for two clusters.",
+                why="The jobs of a queue have a scheduler of their own.",
+                fix="Leave one of them out.",
             )
-        wishes = SolverSweepOptions(samples, workers, case_limit, own, options)
-        sweep_solver_file(study, wishes, Console(as_json, verbose))
-        return
-    console = Console(as_json, verbose)
-    if options is not None:
-        from palpate.cli.improvement_lines import improve_file
-
-        improve_file(study, options, own, console, refine=refine)
-        return
-    sweep_file(study, workers, console, own, case_limit=case_limit, samples=samples, refine=refine)
+        queue = JobQueue.of(cluster, folder=study.parent / f"{study.stem}-jobs")
+        console.say(f"{queue}; logs in {queue.folder}")
+        return queue
+    if scheduler is not None:
+        return contextlib.nullcontext(Scheduler(scheduler, *certificates))
+    if any(certificates):
+        raise UsageError("Certificates belong to a scheduler.", fix="Give its address with --scheduler.")
+    return contextlib.nullcontext(None)

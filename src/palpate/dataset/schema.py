@@ -130,8 +130,11 @@ def beam_fields(nodes: int) -> tuple[Field, ...]:
     )
 
 
+_TORQUE = Field("torque", ("component",), (3,), "N m", "torque on a tool about its place", optional=True)
+
+
 def solid_fields(
-    nodes: int, ranges: Sequence[Range], *, stress: bool = False, edges: int = 0
+    nodes: int, ranges: Sequence[Range], *, stress: bool = False, edges: int = 0, torque: bool = False
 ) -> tuple[Field, ...]:
     """Return the fields that a solid with so many nodes answers under an interaction with n inputs.
 
@@ -149,6 +152,8 @@ def solid_fields(
     edges : int
         Number of the surface's edges, in whose middles the displacement is answered too, ``"mid_displacement"``; by
         default it is not.
+    torque : bool
+        True adds the torque on a tool about its place, ``"torque"``.
     """
     n, units = len(ranges), [conjugate_unit(r.unit) for r in ranges]
     slopes = {f"{unit}/{r.unit}" for unit in units for r in ranges}
@@ -164,6 +169,7 @@ def solid_fields(
         Field("strain_energy", unit="J", meaning="energy in the body: elastic, and the plastic work"),
         Field("response", ("input",), (n,), ", ".join(units), "−∂U/∂input: on a probe the force"),
         Field("response_gradient", ("input", "along"), (n, n), slope, "∂response/∂input"),
+        *((_TORQUE,) if torque else ()),
         Field("penetration", unit="m", meaning="largest penetration of the pad"),
         Field("least_volume_ratio", meaning="least det F of the body"),
         Field("largest_strain", meaning="largest |λ − 1| of a principal stretch λ", optional=True),

@@ -24,6 +24,7 @@ from palpate.network.shared_memory import Block
 __all__ = [
     "ASSUMED_DAMPING",
     "HARDWARE_PATIENCE",
+    "NO_TORQUE",
     "PLAIN_AXES",
     "UNPUBLISHED",
     "Axes",
@@ -42,6 +43,7 @@ Axes = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float
 ASSUMED_DAMPING = 0.5  # N·s/m, of a device whose maker publishes none
 _FASTEST_START = 1.0  # m/s
 UNPUBLISHED = f"damping: none is published, {ASSUMED_DAMPING:g} N·s/m is assumed"
+NO_TORQUE = np.zeros(3)
 PLAIN_AXES: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -91,6 +93,10 @@ class Traits:
         loop measures counts where it is larger.
     buttons : int
         How many buttons `Sample.buttons` tells of.
+    orients : bool
+        Whether `Sample.orientation` says how the handle is turned.
+    max_torque : float
+        Largest torque that its motors render, N m; 0 for a device without, whose `write` is given forces alone.
     name : str
         What the opened device calls itself; empty takes the name of its kind.
     """
@@ -110,6 +116,8 @@ class Traits:
     resolution: float = 0.0
     noise: float = 0.0
     buttons: int = 0
+    orients: bool = False
+    max_torque: float = 0.0
     name: str = ""
 
     @property
@@ -125,6 +133,8 @@ class Sample:
     ----------
     position : (3,)
         Hand, m from the centre of the workspace, in the axes that `Traits.axes` turns.
+    orientation : (4,)
+        Quaternion w, x, y, z of the handle's turn in the same axes, of length 1; where none is told, no turn.
     time : float
         Last sign of life, s of the loop's clock: a fresh sample of hardware, a heartbeat of a page.
     patience : float
@@ -142,10 +152,13 @@ class Sample:
         A stop switch of the device is pressed.
     """
 
-    __slots__ = ("asleep", "buttons", "clutched", "holding", "patience", "position", "stop", "time")
+    __slots__ = (
+        "asleep", "buttons", "clutched", "holding", "orientation", "patience", "position", "stop", "time",
+    )  # fmt: skip
 
     def __init__(self, patience: float = HARDWARE_PATIENCE) -> None:
         self.position = np.zeros(3)
+        self.orientation = np.array([1.0, 0.0, 0.0, 0.0])
         self.time = -np.inf
         self.patience = patience
         self.holding = False
@@ -161,6 +174,7 @@ class Device(Protocol):
     `read` and `write` are called once a tick. They must not block for longer than a fraction of it and must
     not allocate. Whatever they raise, the loop turns into a fault and zero force: best a `DeviceStopError` where the
     device's own safety acts, a `DeviceLostError` where it is gone, a `DeviceError` or an `OSError` for the rest. A
+    driver whose traits have a `max_torque` is called as `write(force, torque)`, with a torque (3,), N m, on the hand. A
     driver that counts what is no fault, such as saturated motors, may have a text `note`, which the report shows.
     """
 
@@ -173,8 +187,8 @@ class Device(Protocol):
         """Return the latest reading at the tick that began at `now`, s."""
         ...
 
-    def write(self, force: np.ndarray) -> None:
-        """Push on the hand with `force` (3,), N, until the next call."""
+    def write(self, force: np.ndarray, torque: np.ndarray = NO_TORQUE, /) -> None:
+        """Push on the hand with `force` (3,), N, and turn it by `torque` (3,), N m, until the next call."""
         ...
 
     def close(self) -> None:

@@ -6,6 +6,8 @@ itself; the profile's largest force as the library's own limit; the firmware's w
 with the brakes on, of which the later half must look right. Brakes and forces wait for the first `write`: until the
 loop runs, nobody would feed the watchdog.
 
+A wrist tells its orientation, and one with motors is given the torque; on any other the force acts alone.
+
 In the loop `read` takes a position and the buttons, and every 5 ms the status. A reading that came too soon for the
 library's time guard is no fresh sample. Forces that the device has turned off by itself are an error with its cause in
 words. After its velocity brake or its watchdog they are turned on again once zero force was asked for half a second;
@@ -20,12 +22,22 @@ import contextlib
 import math
 from ctypes import byref, c_double, c_ushort
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from palpate.devices.device import ASSUMED_DAMPING, UNPUBLISHED, Driver, Sample, Traits, free_buttons
+from palpate.devices.device import (
+    ASSUMED_DAMPING,
+    NO_TORQUE,
+    UNPUBLISHED,
+    Driver,
+    Sample,
+    Traits,
+    free_buttons,
+)
 from palpate.devices.device_options import DeviceOptions, number, switch
 from palpate.devices.force_dimension_library import FORCES_OFF, LOST, DhdLibrary, Status
+from palpate.devices.orientation import rotation_into
 from palpate.devices.profiles import DeviceProfile, device_profile, weakest_profile
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError
 
@@ -126,6 +138,8 @@ class ForceDimensionDevice(Driver):
         if code == 0:
             position = sample.position
             position[0], position[1], position[2] = self._x.value, self._y.value, self._z.value
+            if self.traits.orients:
+                rotation_into(self._frame, sample.orientation)
             sample.time = now
         elif code == 1:
             self.guarded += 1
@@ -136,15 +150,16 @@ class ForceDimensionDevice(Driver):
         sample.buttons = free_buttons(mask, self._clutch)
         return sample
 
-    def write(self, force: np.ndarray) -> None:
-        """Push with a force (3,), N; forces that are off are turned on first where that is due."""
+    def write(self, force: np.ndarray, torque: np.ndarray = NO_TORQUE) -> None:
+        """Push with a force (3,), N, and a torque (3,), N m; forces that are off are turned on where that is due."""
         x, y, z, norm = self.components(force)
-        if norm > 0.0:
+        wrench = [x, y, z, *self.components(torque)[:3]] if self.traits.max_torque > 0.0 else [x, y, z]
+        if norm > 0.0 or any(wrench[3:]):
             self._pushed = self._now
         if not self._on:
             self._turn_on()
-            x = y = z = 0.0
-        code = self._push(x, y, z, self._id)
+            wrench = [0.0] * len(wrench)
+        code = self._push(*wrench, self._id)
         if code == 2:
             self.saturations += 1
         elif code != 0:
@@ -156,7 +171,10 @@ class ForceDimensionDevice(Driver):
             return
         self.closed = True
         with contextlib.suppress(DeviceError):  # a device that is gone pushes no more
-            self._dhd.call("dhdSetForce", 0.0, 0.0, 0.0, self._id)
+            numbers = 6 if self.traits.max_torque > 0.0 else 3
+            self._dhd.call(
+                "dhdSetForceAndTorque" if numbers == 6 else "dhdSetForce", *[0.0] * numbers, self._id
+            )
         for last in ("dhdStop", "dhdClose"):
             with contextlib.suppress(DeviceError):
                 self._dhd.call(last, self._id)
@@ -265,7 +283,27 @@ class ForceDimensionDevice(Driver):
             )
         own_word = "; force: the device itself" if force < self.profile.max_force else ""
         source = f"{self.profile.name}: {self.profile.source}{own_word}; {UNPUBLISHED}"
-        self.traits = self.limited_traits(self.profile, source, max_force=force)
+        wrist = self._find_wrist()
+        self.traits = self.limited_traits(self.profile, source, max_force=force, **wrist)
+
+    def _find_wrist(self) -> dict[str, Any]:
+        """Find out whether the handle tells its orientation, and whether motors turn it; take what reads and turns it."""
+        dhd, device = self._dhd, self._id
+        needed = (
+            "dhdHasWrist",
+            "dhdHasActiveWrist",
+            "dhdGetPositionAndOrientationFrame",
+            "dhdSetForceAndTorque",
+        )
+        if not all(dhd.has(name) for name in needed) or not dhd.dhdHasWrist(device):
+            return {}
+        self._frame = (c_double * 9)()
+        self._position = dhd.dhdGetPositionAndOrientationFrame
+        self._place = (*self._place, self._frame)
+        active = bool(dhd.dhdHasActiveWrist(device)) and self.profile.max_torque > 0.0
+        if active:
+            self._push = dhd.dhdSetForceAndTorque
+        return {"orients": True, "max_torque": self.profile.max_torque if active else 0.0}
 
     def _home(self) -> None:
         """Refuse a device whose encoders count from anywhere, or let it home itself where that was asked for."""

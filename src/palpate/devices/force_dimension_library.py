@@ -1,4 +1,4 @@
-"""Force Dimension's library, DHD with DRD, as far as a driver of the translations needs it: names, types, return codes.
+"""Force Dimension's library, DHD with DRD, as far as a driver of handle and wrist needs it: names, types, return codes.
 
 The library is loaded by `DhdLibrary` and not before. Each function's return code is looked at by itself: 0 is success,
 -1 an error with the library's words, 1 of a reading means that it came too soon and repeats the old values, 2 of a
@@ -76,9 +76,13 @@ _SIGNATURES: Signatures = {
     "dhdSleep": (None, (c_double,)),
     "dhdGetTime": (c_double, ()),
 }
-# those that not every library has: DRD comes in libdrd alone
+# those that not every library has: DRD comes in libdrd alone, wrists came later
 _EXTRA: Signatures = {
     "dhdEnableSimulator": (None, (c_bool,)),
+    "dhdHasWrist": (c_bool, (c_byte,)),
+    "dhdHasActiveWrist": (c_bool, (c_byte,)),
+    "dhdGetPositionAndOrientationFrame": (c_int, (_DOUBLES, _DOUBLES, _DOUBLES, _DOUBLES, c_byte)),
+    "dhdSetForceAndTorque": (c_int, (*(c_double,) * 6, c_byte)),
     "drdOpenID": (c_int, (c_byte,)),
     "drdIsInitialized": (c_bool, (c_byte,)),
     "drdAutoInit": (c_int, (c_byte,)),

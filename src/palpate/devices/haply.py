@@ -7,7 +7,7 @@ answer counts as lost and the latest force is sent; of several frames the newest
 tick old, and its time is that of the command it answers.
 
 Two spellings of a force are in use, ``vector`` and ``values``. The service is silent about one that it doesn't know.
-The driver proves itself by the echoed force: an echo that stays zero for 50 commands makes it try the other spelling,
+A grip tells how it is turned; none of these devices renders a torque. The driver proves itself by the echoed force: an echo that stays zero for 50 commands makes it try the other spelling,
 once. A service that echoes nothing is asked of its user. What the frames say is read in `haply_frames`.
 
 Only the thread that calls `read` and `write` is used; no call waits for longer than `HaplySettings.wait`.
@@ -251,12 +251,16 @@ class HaplyDevice(Driver):
         )
 
     def _press(self, frame: Mapping[str, Any]) -> None:
-        """Take the buttons of the grips, in the order of their names; the one that holds is the driver's own."""
+        """Take orientation and buttons of the grips, in the order of their names; one that holds is the driver's own.
+
+        Of several grips the last one's orientation counts: `grip` names one.
+        """
         sample, own = self.sample, self._settings.hold
         sample.holding, sample.buttons = not own, 0
         for grip in haply_frames.grips_in(frame, self._settings.grip):
             pressed = haply_frames.read_buttons(grip)
             mask = sum(down << place for place, down in enumerate(pressed.values()))
+            haply_frames.read_orientation(grip, sample.orientation)
             sample.holding = sample.holding or pressed.get(own, False)
             sample.buttons |= free_buttons(mask, list(pressed).index(own) if own in pressed else -1)
 
@@ -354,6 +358,7 @@ class HaplyDevice(Driver):
             f"{self.profile.source}; {UNPUBLISHED}",
             stamped=True,  # a sample is as old as the question to it
             buttons=self._count_buttons(frame),
+            orients=any(haply_frames.grips_in(frame, self._settings.grip)),
         )
 
     def _count_buttons(self, frame: Mapping[str, Any]) -> int:

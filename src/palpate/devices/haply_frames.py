@@ -11,8 +11,11 @@ from __future__ import annotations
 
 import http.client
 import json
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
+
+import numpy as np
 
 from palpate.devices.profiles import PROFILES, DeviceProfile, weakest_profile
 from palpate.errors import DeviceError
@@ -25,6 +28,7 @@ __all__ = [
     "device_types",
     "grips_in",
     "read_buttons",
+    "read_orientation",
     "read_scale",
     "read_vector",
 ]
@@ -86,6 +90,14 @@ def read_buttons(grip: Mapping[str, Any]) -> dict[str, bool]:
     pressed = {name: value for name, value in state.items() if name == "button" or name.startswith("button_")}
     pressed |= several if isinstance(several, Mapping) else {}
     return {name: bool(pressed[name]) for name in sorted(pressed)}
+
+
+def read_orientation(grip: Mapping[str, Any], quaternion: np.ndarray) -> None:
+    """Fill a grip's turn (4,), a quaternion w, x, y, z, in the service's axes; one that tells none stays as it is."""
+    told = (grip.get("state") or {}).get("orientation")
+    if isinstance(told, Mapping):
+        for k, axis in enumerate("wxyz"):
+            quaternion[k] = float(told.get(axis, math.nan))
 
 
 def read_scale(answer: Any) -> float:

@@ -25,6 +25,7 @@ from palpate.devices import openhaptics_servo as servo
 from palpate.devices.device import (
     ASSUMED_DAMPING,
     HARDWARE_PATIENCE,
+    NO_TORQUE,
     PLAIN_AXES,
     UNPUBLISHED,
     Driver,
@@ -34,6 +35,7 @@ from palpate.devices.device import (
 )
 from palpate.devices.device_options import DeviceOptions, number, word
 from palpate.devices.openhaptics_library import LOST, NO_DEVICE, Code, HdError, HdLibrary
+from palpate.devices.orientation import rotation_into
 from palpate.devices.profiles import DeviceProfile, device_profile, weakest_profile
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError
 
@@ -52,6 +54,10 @@ _PAUSE, _LONGEST_PAUSE, _AGAIN = 0.1, 5.0, 10.0
 _GOODBYE = 0.1  # s for the last frame
 _BUTTONS = 4
 _MM = 1e-3
+_ALL_AXES = 6  # of a handle whose turn is told, or which is turned
+_TORQUE = (
+    0.048  # N m, what the weakest axis of a Phantom Premium 6DOF renders for long (its maker's data sheet)
+)
 
 
 @dataclass(frozen=True)
@@ -129,6 +135,9 @@ class OpenHapticsDevice(Driver):
             self.frames, sample.time = frame, now
             np.multiply(self._place, _MM, out=sample.position)
             sample.position -= self._centre
+            if self.traits.orients:
+                a = self._box.turn.tolist()  # column by column
+                rotation_into((a[0], a[4], a[8], a[1], a[5], a[9], a[2], a[6], a[10]), sample.orientation)
             sample.holding = not (inkwell and self._rests) and (switch or not self._needs_switch)
             sample.clutched = self._clutch >= 0 and bool(mask >> self._clutch & 1)
             sample.buttons = free_buttons(mask, self._clutch)
@@ -140,13 +149,19 @@ class OpenHapticsDevice(Driver):
             raise DeviceStopError(self._words)
         return sample
 
-    def write(self, force: np.ndarray) -> None:
-        """Leave a force (3,), N, for the next frame; one over the device's maximum is shortened."""
+    def write(self, force: np.ndarray, torque: np.ndarray = NO_TORQUE) -> None:
+        """Leave a force (3,), N, and a torque (3,), N m, for the next frame.
+
+        A force over the device's maximum is shortened. A device without motors in its wrist takes no torque.
+        """
         x, y, z, norm = self.components(force)
         if norm > self.traits.max_force:  # more than that, and the library turns the forces off
             share = self.traits.max_force / norm
             x, y, z = share * x, share * y, share * z
-        self._box.write(x, y, z)
+        *twist, turning = self.components(torque)
+        share = 1e3 * min(1.0, self.traits.max_torque / turning) if turning > 0.0 else 0.0
+        self._box.write(x, y, z, *(share * part for part in twist))
+        norm += turning
         if self._told != self._resumed and norm == 0.0 and self._now >= self._until:
             if not self._hd.hdIsEnabled(Code.FORCE_OUTPUT):
                 self._hd.hdEnable(Code.FORCE_OUTPUT)
@@ -218,6 +233,7 @@ class OpenHapticsDevice(Driver):
             for code in (Code.MAX_FORCE, Code.CONTINUOUS_FORCE, Code.MAX_STIFFNESS)
         )
         usable, largest = (hd.numbers(code, 6) for code in (Code.USABLE_WORKSPACE, Code.MAX_WORKSPACE))
+        axes, rendered = (hd.whole_number(code) for code in (Code.INPUT_AXES, Code.OUTPUT_AXES))
         hd.hdEndFrame(self._device)
         self._refuse(hd.errors(), "can't be asked what it is", "Start it again.")
         known = next((name for word, name in _MODELS.items() if word in model.lower()), "")
@@ -237,6 +253,8 @@ class OpenHapticsDevice(Driver):
             delay=2.0 / self._settings.rate,
             max_stiffness=min(self.profile.max_stiffness, stiffness / _MM),
             continuous_force=continuous,
+            orients=axes >= _ALL_AXES,
+            max_torque=_TORQUE if rendered >= _ALL_AXES else 0.0,
             reach=corner + _MARGIN if math.isfinite(corner) and corner > 0.05 else _UNSTATED_REACH,
         )
 
@@ -271,6 +289,8 @@ class OpenHapticsDevice(Driver):
         hd.errors()  # a help that is not relied on
         hd.hdSetSchedulerRate(rate)
         self._refuse(hd.errors(), f"doesn't run at {rate} Hz", "Try openhaptics:rate=500.")
+        self._cells[servo.ORIENTS] = float(self.traits.orients)
+        self._cells[servo.RENDERS] = float(self.traits.max_torque > 0.0)
         cells = self._cells.ctypes.data
         self._handle = hd.hdScheduleAsynchronous(servo.servo().address, cells, _PRIORITY)
         self._refuse(hd.errors(), "takes no callback", "Close other programs that use it.")

@@ -1,7 +1,8 @@
 """3D Systems' OpenHaptics HD library, as far as a driver of one device needs it: names, types, numbers, errors.
 
 The library is loaded by whoever makes an `HdLibrary`, and not before. Names, numbers and types are those of the HD
-headers (hdDevice, hdDefines, hdScheduler; 3.30): lengths in mm, velocities in mm/s, forces in N, stiffness in N/mm.
+headers (hdDevice, hdDefines, hdScheduler; 3.30): lengths in mm, velocities in mm/s, forces in N, torques in mN m,
+stiffness in N/mm.
 """
 
 from __future__ import annotations
@@ -60,11 +61,12 @@ class Code:
     """Numbers of parameters and capabilities."""
 
     BUTTONS, SAFETY_SWITCH, INKWELL = 0x2000, 0x2001, 0x2002
-    POSITION, VELOCITY = 0x2050, 0x2051
+    POSITION, VELOCITY, TRANSFORM = 0x2050, 0x2051, 0x2052
     MODEL, SERIAL = 0x2501, 0x2504
     MAX_WORKSPACE, USABLE_WORKSPACE, CALIBRATION_STYLE = 0x2550, 0x2551, 0x2555
+    INPUT_AXES, OUTPUT_AXES = 0x2553, 0x2554  # six where the handle's turn is told, or torques are rendered
     MAX_STIFFNESS, MAX_FORCE, CONTINUOUS_FORCE = 0x2602, 0x2603, 0x2604
-    FORCE = 0x2700
+    FORCE, TORQUE = 0x2700, 0x2701
     FORCE_OUTPUT, CLAMPING = 0x4000, 0x4001
     CALIBRATED, NEEDS_UPDATE, NEEDS_HAND = 0x5000, 0x5001, 0x5002
     AUTOMATIC, IN_INKWELL = 2, 4  # styles of calibration
@@ -137,3 +139,9 @@ class HdLibrary(VendorLibrary):
         values = (c_double * count)()
         self.hdGetDoublev(code, values)
         return () if self.errors() else tuple(values)
+
+    def whole_number(self, code: int) -> int:
+        """Return a parameter that is a whole number; 0 where the device has none."""
+        value = c_int()
+        self.hdGetIntegerv(code, ctypes.byref(value))
+        return 0 if self.errors() else value.value

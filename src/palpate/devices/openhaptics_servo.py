@@ -52,15 +52,19 @@ FIRST = 50  # frames at the start whose places and velocities are kept
 SILENCE = 1.0  # cause of a stop: the loop was silent; all others are the library's errors
 _extension: Any = intrinsic  # whose own types know nothing of the typing context that it takes away
 _POSITION, _VELOCITY, _FORCE = Code.POSITION, Code.VELOCITY, Code.FORCE
+_TRANSFORM, _TORQUE = Code.TRANSFORM, Code.TORQUE
 _BUTTONS, _INKWELL, _SWITCH = Code.BUTTONS, Code.INKWELL, Code.SAFETY_SWITCH
 _MOST_ERRORS = 64  # a list that is longer doesn't end
 
 # cells of 8 bytes; addresses and counts are numbers too, which a double holds exactly up to 2⁵³
 BASE, DEVICE, BEGIN, END, DOUBLES, INTEGERS, BOOLEANS, SET, ERROR, HIDDEN = range(10)
-WRITTEN, RESUMED, LEAVING, PATIENCE, FORCE = 10, 11, 12, 13, 14  # of the loop; FORCE has three cells
-FRAMES, STOPS, CAUSE, INTERNAL, FATAL, FATAL_INTERNAL = range(17, 23)  # of the callback
-SEEN, SILENT, PUSH, FETCHED, SLOTS = 23, 24, 25, 28, 30  # its own; PUSH has three cells, FETCHED two
-PLACE, BUTTONS, INKWELL, SWITCH, _SLOT = 0, 3, 4, 5, 6  # within one of the two slots; PLACE has three cells
+# of the loop; FORCE has three cells, and the torque's three in mN m
+WRITTEN, RESUMED, LEAVING, PATIENCE, FORCE, ORIENTS, RENDERS = 10, 11, 12, 13, 14, 20, 21
+FRAMES, STOPS, CAUSE, INTERNAL, FATAL, FATAL_INTERNAL = range(22, 28)  # of the callback
+SEEN, SILENT, PUSH, FETCHED, SLOTS = 28, 29, 30, 36, 38  # its own; PUSH has six cells, FETCHED two
+# within one of the two slots; PLACE has three cells, TURN the sixteen of a matrix, column by column
+PLACE, BUTTONS, INKWELL, SWITCH, TURN, _SLOT = 0, 3, 4, 5, 6, 22
+_WRENCH = 6
 EARLY = SLOTS + 2 * _SLOT  # FIRST times place and velocity
 _CELLS = EARLY + 6 * FIRST
 
@@ -75,6 +79,7 @@ class Mailbox:
     def __init__(self, functions: Mapping[str, int], device: int, patience: int) -> None:
         self.cells = cells = np.zeros(_CELLS)
         self._integers, self._bytes = cells.view(np.int32), cells.view(np.uint8)
+        self.turn = np.zeros(16)
         cells[BASE], cells[DEVICE], cells[PATIENCE] = cells.ctypes.data, device, patience
         names = (
             "hdBeginFrame",
@@ -88,20 +93,25 @@ class Mailbox:
             cells[cell] = functions[name]
         cells[ERROR], cells[HIDDEN] = functions["hdGetError"], sys.platform == "win32"
 
-    def write(self, x: float, y: float, z: float) -> None:
-        """Leave a force, N, for the next frame."""
+    def write(self, x: float, y: float, z: float, a: float = 0.0, b: float = 0.0, c: float = 0.0) -> None:
+        """Leave a force, N, and a torque, mN m, for the next frame."""
         cells = self.cells
         cells[WRITTEN] += 1.0
         cells[FORCE], cells[FORCE + 1], cells[FORCE + 2] = x, y, z
+        cells[FORCE + 3], cells[FORCE + 4], cells[FORCE + 5] = a, b, c
         cells[WRITTEN] += 1.0
 
     def read(self, place: np.ndarray) -> tuple[int, int, bool, bool]:
-        """Write the latest place (3,), mm, into `place`; return frame, buttons, inkwell and safety switch."""
+        """Write the latest place (3,), mm, into `place`; return frame, buttons, inkwell and safety switch.
+
+        `turn` (16,) is the handle's matrix of the same frame, column by column, where the device tells one.
+        """
         cells = self.cells
         frame = int(cells[FRAMES])
         while True:
             slot = SLOTS + _SLOT * (frame & 1)
             place[:] = cells[slot : slot + 3]
+            self.turn[:] = cells[slot + TURN : slot + TURN + 16]
             mask = int(self._integers[2 * (slot + BUTTONS)])
             inkwell, switch = (bool(self._bytes[8 * (slot + cell)]) for cell in (INKWELL, SWITCH))
             if frame == (latest := int(cells[FRAMES])):
@@ -157,20 +167,32 @@ def servo() -> Any:
 
 
 @part
-def _choose_force(box, written, x, y, z):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    """Take a force that was written whole, and zero where the loop is silent or has not answered to a stop."""
+def _choose_force(box, written, wrench):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Take a force and torque (6,) that was written whole, and zero where the loop is silent or has not answered to a stop."""
     if written == box[WRITTEN] and written % 2.0 == 0.0:
-        box[PUSH], box[PUSH + 1], box[PUSH + 2] = x, y, z
+        for i in range(_WRENCH):
+            box[PUSH + i] = wrench[i]
         box[SILENT] = box[SILENT] + 1.0 if written == box[SEEN] else 0.0
         box[SEEN] = written
     else:
         box[SILENT] += 1.0
-    pushes = box[PUSH] != 0.0 or box[PUSH + 1] != 0.0 or box[PUSH + 2] != 0.0
+    pushes = False
+    for i in range(_WRENCH):
+        pushes = pushes or box[PUSH + i] != 0.0
     if pushes and box[SILENT] > box[PATIENCE] and box[STOPS] == box[RESUMED]:
         box[CAUSE], box[INTERNAL] = SILENCE, 0.0
         box[STOPS] += 1.0
     if box[STOPS] != box[RESUMED] or box[LEAVING] != 0.0:
-        box[PUSH], box[PUSH + 1], box[PUSH + 2] = 0.0, 0.0, 0.0
+        for i in range(_WRENCH):
+            box[PUSH + i] = 0.0
+
+
+@part
+def _push(box, base):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Send force and torque."""
+    _transfer(np.int64(box[SET]), np.uint32(_FORCE), base + 8 * PUSH)
+    if box[RENDERS] != 0.0:
+        _transfer(np.int64(box[SET]), np.uint32(_TORQUE), base + 8 * (PUSH + 3))
 
 
 @part
@@ -208,9 +230,18 @@ def _called(data):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     doubles, booleans = np.int64(box[DOUBLES]), np.int64(box[BOOLEANS])
     written = box[WRITTEN]
     _frame(np.int64(box[BEGIN]), device)
-    x, y, z = box[FORCE], box[FORCE + 1], box[FORCE + 2]
+    x, y, z, a, b, c = (
+        box[FORCE],
+        box[FORCE + 1],
+        box[FORCE + 2],
+        box[FORCE + 3],
+        box[FORCE + 4],
+        box[FORCE + 5],
+    )
     _transfer(doubles, np.uint32(_POSITION), base + 8 * (slot + PLACE))
-    _choose_force(box, written, x, y, z)
+    if box[ORIENTS] != 0.0:
+        _transfer(doubles, np.uint32(_TRANSFORM), base + 8 * (slot + TURN))
+    _choose_force(box, written, (x, y, z, a, b, c))
     _transfer(np.int64(box[INTEGERS]), np.uint32(_BUTTONS), base + 8 * (slot + BUTTONS))
     _transfer(booleans, np.uint32(_INKWELL), base + 8 * (slot + INKWELL))
     _transfer(booleans, np.uint32(_SWITCH), base + 8 * (slot + SWITCH))
@@ -218,14 +249,15 @@ def _called(data):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
         early = base + 8 * (EARLY + 6 * (frames - 1))
         _transfer(doubles, np.uint32(_POSITION), early)
         _transfer(doubles, np.uint32(_VELOCITY), early + 24)
-    _transfer(np.int64(box[SET]), np.uint32(_FORCE), base + 8 * PUSH)
+    _push(box, base)
     _frame(np.int64(box[END]), device)
     may_begin = _take_errors(box, words)
     if box[FATAL] != 0.0:
         if may_begin:
-            box[PUSH], box[PUSH + 1], box[PUSH + 2] = 0.0, 0.0, 0.0
+            for i in range(_WRENCH):
+                box[PUSH + i] = 0.0
             _frame(np.int64(box[BEGIN]), device)
-            _transfer(np.int64(box[SET]), np.uint32(_FORCE), base + 8 * PUSH)
+            _push(box, base)
             _frame(np.int64(box[END]), device)
         return np.uint32(DONE)
     box[FRAMES] = np.float64(frames)

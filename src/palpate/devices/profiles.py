@@ -18,6 +18,7 @@ from palpate.errors import UsageError
 __all__ = ["PROFILES", "DeviceProfile", "device_profile", "limits_in_words", "weakest_profile"]
 
 _COARSEST = 6e-5  # m
+_TORQUE = 0.2  # N m: below what such wrists render, since their makers' figures were not at hand
 _CHAI3D = "as open drivers have it (CHAI3D 3.2)"
 
 
@@ -34,6 +35,7 @@ class DeviceProfile:
     source: str = _CHAI3D  # where the figures come from
     # m, steps of the handle's place, rounded from data sheets; the coarsest where none is known
     resolution: float = _COARSEST
+    max_torque: float = 0.0  # N m about any axis, of a wrist with motors; 0: it has none
 
 
 _UNSTATED = float("inf")
@@ -46,10 +48,10 @@ PROFILES: dict[str, DeviceProfile] = {
         DeviceProfile("omega.6", _DHD, 12.0, 5000.0, 30.0, 0.075, resolution=1e-5),
         DeviceProfile("omega.7", _DHD, 12.0, 5000.0, 30.0, 0.075, resolution=1e-5),
         DeviceProfile("delta.3", _DHD, 20.0, 5000.0, 30.0, 0.15, resolution=3e-5),
-        DeviceProfile("delta.6", _DHD, 20.0, 5000.0, 30.0, 0.15, resolution=3e-5),
-        DeviceProfile("sigma.6+", _DHD, 12.0, 4000.0, 30.0, 0.09),
-        DeviceProfile("sigma.7", _DHD, 12.0, 4000.0, 30.0, 0.075),
-        DeviceProfile("lambda.7", _DHD, 12.0, 8000.0, 30.0, 0.1125),
+        DeviceProfile("delta.6", _DHD, 20.0, 5000.0, 30.0, 0.15, resolution=3e-5, max_torque=_TORQUE),
+        DeviceProfile("sigma.6+", _DHD, 12.0, 4000.0, 30.0, 0.09, max_torque=_TORQUE),
+        DeviceProfile("sigma.7", _DHD, 12.0, 4000.0, 30.0, 0.075, max_torque=_TORQUE),
+        DeviceProfile("lambda.7", _DHD, 12.0, 8000.0, 30.0, 0.1125, max_torque=_TORQUE),
         DeviceProfile("falcon", _DHD, 8.0, 3000.0, 20.0, 0.04),
         DeviceProfile("touch", _HD, 3.3, 400.0, 4.0, 0.075),
         DeviceProfile("omni", _HD, 3.3, 700.0, 5.0, 0.10),

@@ -38,6 +38,11 @@ TICK = np.dtype(
         ("tick", "i8"),
         ("time", "f8"),  # s, of the loop's clock, when the tick began
         ("sample_position", "f8", 3),  # m, device axes, as the driver gave it
+        (
+            "sample_orientation",
+            "f8",
+            4,
+        ),  # quaternion w, x, y, z, device axes; zero of a device that tells none
         ("sample_time", "f8"),  # s
         ("patience", "f8"),  # s
         ("hand", "f8", 3),  # m, x right, y up, z towards the user
@@ -46,6 +51,8 @@ TICK = np.dtype(
         ("wanted", "f8", 3),  # N on the hand, body axes: before limits and controller
         ("force", "f8", 3),  # N on the hand, body axes, as sent
         ("sent", "f8", 3),  # N, device axes, as the driver was given it
+        ("torque", "f8", 3),  # N m on the hand, body axes, as sent
+        ("sent_torque", "f8", 3),  # N m, device axes, as the driver was given it
         ("ledger", "f8", LEDGER),  # energy, its lowest, added damping, what that took, leak: J, N·s/m, m²
         ("parameters", "f8", MAX_INPUTS),  # the inputs that the hand doesn't supply, in force
         ("lateness", "f4"),  # s

@@ -13,6 +13,7 @@ from palpate.export.answer_network import MOST_DOUBTS, AnswerNetwork
 from palpate.export.core_source import core_source, fill_template
 from palpate.export.weights_block import (
     ANSWER_NETS,
+    ARM_NET,
     ARRAYS,
     DOUBT_ARRAYS,
     DOUBTS,
@@ -84,7 +85,13 @@ def c_files(
         outputs, title = answers.outputs, str(answers)
     else:
         felt, title = len(surrogate.hand_energy.baseline.directions), title.splitlines()[0]
-        has = {"BODY": True, "MEMORY": block.memory, "RELEASE": block.releases, "FIELD": block.field}
+        has = {
+            "BODY": True,
+            "TORQUE": ARM_NET in block.tables,
+            "MEMORY": block.memory,
+            "RELEASE": block.releases,
+            "FIELD": block.field,
+        }
         parts = [part for part, there in has.items() if there]
     facts = _Facts(name, single, block, title, surrogate.inputs, outputs, felt)
     words = _words(facts, surrogate)
@@ -205,6 +212,7 @@ def _notes(facts: _Facts, surrogate: Surrogate) -> list[str]:
         return ["", *(f"output {i}: {q.name} {q.unit}".rstrip() for i, q in enumerate(facts.outputs[:50]))]
     holds = surrogate.hand_energy.baseline.holds
     x = "displacement of what the hand holds from its rest" if holds else "centre of the probe"
+    x = "foremost point of the tool" if surrogate.torque_evaluator is not None else x
     return ["", f"x (3) is the {x}, m; p are the inputs after the first {facts.felt}, in their units."]
 
 
@@ -231,7 +239,7 @@ def _source(facts: _Facts) -> str:
     first = f'#include "{facts.name}.h"\n' + ("#define PP_SINGLE\n" if facts.single else "")
     tables, external = [], []
     for place, table in _tables_to_store(facts.block):
-        if place >= FIELD and facts.block.field:
+        if FIELD <= place < ARM_NET and facts.block.field:
             external += [
                 f"extern const {kind} {declarator};" for kind, declarator, _ in _parts(facts, place, table)
             ]
@@ -251,7 +259,7 @@ def _field_source(facts: _Facts) -> str:
         "#include <stdint.h>",
     ]
     for place, table in _tables_to_store(facts.block):
-        if place >= FIELD:
+        if FIELD <= place < ARM_NET:
             for kind, declarator, array in _parts(facts, place, table):
                 kind = kind.replace("pp_real", facts.real)
                 lines += [

@@ -53,6 +53,10 @@ class CheckLibrary:
             row[19] = self.body.deviation(x[:3], x[3:])
         return rows
 
+    def torques(self, X: np.ndarray) -> np.ndarray:
+        """Return the torque (N, 3) for each row of X (N, 3 + p)."""
+        return np.array([self.body.torque(x[:3], x[3:])[0] for x in X.tolist()])
+
     def walk(self, X: np.ndarray) -> np.ndarray:
         """Return force, stored and lost energy (N, 5) of each step X (N, 1 + 3 + p)."""
         rows = np.empty((len(X), 5))

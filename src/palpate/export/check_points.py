@@ -23,6 +23,7 @@ from palpate.export.field_tables import PROMISE, deepest_touches
 from palpate.network import Network
 from palpate.network.network_kernels import regressor_rows_into
 from palpate.surrogates import FieldSurrogate, LearntEnergy, Surrogate
+from palpate.surrogates.learnt_torque import ARM
 from palpate.surrogates.moving_rest import MovingRest
 from palpate.units import bounds
 
@@ -245,12 +246,25 @@ def compare_body(
         felt &= ~(np.abs(wanted[:, 1]) < (1e-6 if precision.single else 1e-12))
         rough = np.full(felt.sum(), 1e-2 if precision.single else _DEVIATION)
         parts["deviation"] = difference(wanted[felt, 19:20], got[felt, 19:20], rough)
+    if ARM in surrogate.quantities and hasattr(asker, "torques"):
+        parts["torque"] = _torques(surrogate, asker, X[~deep & np.isfinite(X).all(axis=1)], precision)
     parts["flags"] = _flags(energy, X, wanted, got, precision)
     if surrogate.memory is not None:
         parts |= _stroke(surrogate, asker, precision)
     if field:
         parts["field"] = compare_field(surrogate, surrogate.surface_fields[field], asker, precision)
     return Comparison(parts, precision.single)
+
+
+def _torques(surrogate: Surrogate, asker: Any, X: np.ndarray, precision: Precision) -> Difference:
+    """Compare the torque on a tool at finite places X (N, n)."""
+    limit = np.minimum(
+        _TIGHT * condition(surrogate.quantities[ARM].network, X)
+        + _TIGHT * condition(surrogate.hand_energy.network, X),
+        _LOOSEST,
+    )
+    limit = np.full(len(X), precision.tolerance) if precision.single else limit
+    return difference(surrogate.torque(X), asker.torques(X), limit)
 
 
 def true_answers(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:

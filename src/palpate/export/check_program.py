@@ -37,15 +37,16 @@ class CheckProgram:
         memory: bool = False,
         network: bool = False,
         field: tuple[int, int] = (0, 0),
+        torque: bool = False,
         options: Sequence[str] = (),
     ) -> CheckProgram:
         """Compile exported .c sources, with the header beside them, into `folder` with the program that asks them.
 
         `name` begins the exported names. `memory` says whether a memory is in, `network` whether it is a network alone,
-        `field` how many nodes and components the field has.
+        `field` how many nodes and components the field has, `torque` whether it tells one.
         """
         main = folder / "check_main.c"
-        kinds = {"MEMORY": memory, "NETWORK": network, "FIELD": field[0] > 0}
+        kinds = {"MEMORY": memory, "NETWORK": network, "FIELD": field[0] > 0, "TORQUE": torque}
         head = f'#define CHECK_HEADER "{name}.h"\n#define CHECK_NAME {name}\n'
         head += "".join(f"#define CHECK_{kind} {int(there)}\n" for kind, there in kinds.items())
         main.write_text(head + core_file("check_main.c"), "utf-8")
@@ -74,6 +75,10 @@ class CheckProgram:
     def walk(self, X: np.ndarray) -> np.ndarray:
         """Return force, stored and lost energy (N, 5) of each step X (N, 1 + 3 + p)."""
         return self._ask(1, X, 5)
+
+    def torques(self, X: np.ndarray) -> np.ndarray:
+        """Return the torque (N, 3) for each row of X (N, 3 + p)."""
+        return self._ask(4, X, 3)
 
     def shapes(self, X: np.ndarray) -> np.ndarray:
         """Return the field (N, nodes, components) for each row of X (N, 3 + p)."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Mapping
 from importlib import resources
 
-from palpate.export.weights_block import WeightsBlock
+from palpate.export.weights_block import ARM_NET, WeightsBlock
 
 __all__ = ["core_file", "core_source", "fill_template", "generic_source"]
 
@@ -35,6 +35,7 @@ def core_source(block: WeightsBlock) -> str:
             _hooks(block.baseline),
             core_file("energy.c"),
         ]
+        parts += [core_file("torque.c")] if ARM_NET in block.tables else []
     else:
         parts.append(core_file("answers.c"))
     if block.memory:
@@ -49,7 +50,7 @@ def generic_source(*programs: str) -> str:
     surrogates = resources.files("palpate.surrogates")
     texts = [core_file(name) for name in ("palpate_core.h", "prelude.c", "network.c", "surface.c")]
     texts += [(surrogates / "baselines" / name).read_text("utf-8") for name in _BASELINES]
-    texts += [core_file("generic.c"), core_file("energy.c"), _UNDER_FRICTION]
+    texts += [core_file("generic.c"), core_file("energy.c"), core_file("torque.c"), _UNDER_FRICTION]
     texts += [(surrogates / "memories" / name).read_text("utf-8") for name in _MEMORIES]
     texts += [core_file(name) for name in ("generic_memory.c", "block.c", *programs)]
     return "\n".join(texts)

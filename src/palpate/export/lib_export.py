@@ -184,7 +184,7 @@ def _wrappers(surrogate: Surrogate, done: ExportedC) -> dict[str, str]:
     }
     memory = surrogate.memory
     parts = [] if memory is None else ["MEMORY"] + ["RELEASE"] * memory.moves_rest
-    parts += ["FIELD"] * bool(done.field)
+    parts += ["FIELD"] * bool(done.field) + ["TORQUE"] * (surrogate.torque_evaluator is not None)
     templates = {
         f"{name}.py": "wrapper.py",
         f"{name}_matlab.h": "wrapper_matlab.h",

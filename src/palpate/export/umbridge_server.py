@@ -1,7 +1,7 @@
 """Learnt files as models of UM-Bridge, over HTTP on this machine: values, slopes, and actions of the Hessian.
 
 A body that is touched is served as ``energy`` (J) and ``force`` (N) of two vectors: the felt coordinates, then the
-further inputs, if there are any. Quantities are served under the names of their groups, a network alone as ``outputs``.
+further inputs, if there are any; under a tool that tells its torque, also as ``torque`` (N m, without slopes). Quantities are served under the names of their groups, a network alone as ``outputs``.
 All is in SI units.
 """
 
@@ -36,7 +36,7 @@ class ServedModel:
     sizes: tuple[int, ...]  # of the input vectors
     outputs: int
     value: Callable[[np.ndarray], np.ndarray]  # all inputs (n,) to (m,)
-    jacobian: Callable[[np.ndarray], np.ndarray]  # to (m, k), by the first vector
+    jacobian: Callable[[np.ndarray], np.ndarray] | None  # to (m, k), by the first vector
     hessian: Callable[[np.ndarray], np.ndarray] | None  # to (m, k, k)
     inside: Callable[[np.ndarray], bool]  # whether the answer is of the trained region
     units: tuple[str, ...]  # of all inputs, then of the outputs
@@ -44,8 +44,8 @@ class ServedModel:
     @property
     def support(self) -> dict[str, bool]:
         """Operations of the protocol that the model answers."""
-        named = dict.fromkeys(("Evaluate", "Gradient", "ApplyJacobian"), True)
-        return named | {"ApplyHessian": self.hessian is not None}
+        slopes = dict.fromkeys(("Gradient", "ApplyJacobian"), self.jacobian is not None)
+        return {"Evaluate": True, **slopes, "ApplyHessian": self.hessian is not None}
 
 
 def served_models(surrogate: Surrogate) -> dict[str, ServedModel]:
@@ -77,7 +77,11 @@ def _touch_models(body: Surrogate) -> dict[str, ServedModel]:
         return bool(energy.inside(x[None])[0])
 
     units = tuple(r.unit for r in body.inputs)
+    torque = ServedModel(
+        sizes, 3, lambda x: body.torque(x[None])[0], None, None, inside, (*units, *["N m"] * 3)
+    )
     return {
+        **({} if body.torque_evaluator is None else {"torque": torque}),
         "energy": ServedModel(
             sizes,
             1,
@@ -165,6 +169,7 @@ def _compute(operation: str, model: ServedModel, x: np.ndarray, request: Mapping
                 "UnsupportedFeature",
                 f"{key} is {request[key]!r}: models have one output, and derivatives by the first input vector.",
             )
+    assert model.jacobian is not None  # or it would not be supported
     if operation == "Gradient":
         return _finite(_vector(request, "sens", model.outputs) @ model.jacobian(x))
     vector = _vector(request, "vec", model.sizes[0])

@@ -28,6 +28,7 @@ from palpate.network import Network, TrainedRegion
 from palpate.network.network_kernels import gram, packed
 from palpate.network.radial import RADIAL_FUNCTIONS
 from palpate.surrogates import LearntEnergy, Surrogate, TouchedSurface
+from palpate.surrogates.learnt_torque import ARM
 from palpate.units import bounds
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ANSWER_NETS",
+    "ARM_NET",
     "ARRAYS",
     "BASELINE",
     "DOUBTS",
@@ -72,6 +74,7 @@ HEAD, NUMBERS, LIMITS, POINTS, AXES, NET, ROOT, BASELINE, MEMORY, FIELD, FIELD_N
 )
 ANSWER_NETS, RUNS, MOTION = (NET, BASELINE, BASELINE + 5), 22, 60  # see core/answers.c, core/fmi_motion.c
 PLACES, DOUBTS, DOUBT_ARRAYS = 23, 36, 6  # see core/answers.c
+ARM_NET = 53  # see core/torque.c
 ROOM = 12  # arrays that a baseline may have, and a memory
 ENDLESS = 1e30  # number that stands for infinity
 FAR = 1e15  # coordinate of points that fill up a row
@@ -174,8 +177,10 @@ class WeightsBlock:
                 f"{len(energy.inputs)} inputs are more than the {MOST} of the evaluator core.",
                 fix="Learn the body with fewer parameters.",
             )
-        sources = {identifier(baseline.name): source}
+        kind = baseline.c_name
+        sources = {identifier(kind): source}
         tables = _energy_tables(energy, deviation=deviation)
+        tables |= _arm_tables(surrogate)
         arrays = [Table.of(a) for a in _flat(baseline.compiled().args)]
         for surface in baseline.surfaces:
             arrays = _with_tiles(arrays, surface)
@@ -195,11 +200,11 @@ class WeightsBlock:
                 MEMORY, [Table.of(a) for a in memory.c_arguments()], f"memory {memory.name!r}"
             )
         own = baseline.radius_input
-        head = [len(energy.inputs), len(baseline.directions), _code(baseline.name, _BASELINES), code, 1]
+        head = [len(energy.inputs), len(baseline.directions), _code(kind, _BASELINES), code, 1]
         tables[HEAD] = Table.of(np.array([*head, -1 if own is None else own, size]))
         if field is not None:
             tables |= field_tables(surrogate, field, tables)
-        names = identifier(baseline.name), "" if memory is None else identifier(memory.name)
+        names = identifier(kind), "" if memory is None else identifier(memory.name)
         return cls(tables, *names, sources, field or "")
 
     @classmethod
@@ -387,6 +392,20 @@ def _energy_tables(energy: LearntEnergy, *, deviation: bool) -> dict[int, Table]
         units = min(max(some.units, 1), energy.network.units)
         tables[ROOT] = _root_table(np.pad(root, [(0, units - some.units), (0, 0)]), units)
     return tables
+
+
+def _arm_tables(surrogate: Surrogate) -> dict[int, Table]:
+    """Return the network of the torque per newton, where there is one; a torque by turns has no C form yet."""
+    arm = surrogate.quantities.get(ARM)
+    if arm is not None:
+        return net_tables(arm.network, ARM_NET, 0)
+    if surrogate.torque_evaluator is None:
+        return {}
+    raise UsageError(
+        f"The torque of {surrogate.name!r} has no exported form.",
+        why="Its tool's orientation is an input: the torque is a slope of its energy, which the core does not take.",
+        fix="Ask it in Python, or learn the tool in a fixed orientation.",
+    )
 
 
 def _points(region: TrainedRegion) -> np.ndarray:

@@ -30,7 +30,7 @@ from palpate.improvement.improvement_step import ImprovementStep
 from palpate.improvement.kept_solves import KeptSolves
 from palpate.improvement.stop_rule import AnswerStopRule, StopRule, relative_errors
 from palpate.learning.learn_dataset import learn as learn_dataset
-from palpate.learning.pressed_solves import PROBES, PressedSolves
+from palpate.learning.pressed_solves import PROBES, TOOL, PressedSolves
 from palpate.options import ImprovementOptions, declarations, takes
 from palpate.processes import available_cores
 from palpate.surrogates import Surrogate
@@ -168,13 +168,13 @@ def _is_pressed(problem: Any) -> bool:
     """Return whether a problem is a body under one probe, or without touch; any other is refused."""
     acting = problem.describe().get("interactions", ()) if hasattr(problem, "describe") else ()
     kinds = [entry.get("type") for entry in acting if isinstance(entry, dict)]
-    if len(kinds) == 1 and kinds[0] in PROBES and hasattr(problem, "design"):
+    if len(kinds) == 1 and kinds[0] in (*PROBES, TOOL) and hasattr(problem, "design"):
         return True
     if kinds or not hasattr(problem, "describe"):
         raise UsageError(
-            "Solves can be chosen for a body under one probe, or for a problem without touch.",
+            "Solves can be chosen for a body under one probe or tool, or for a problem without touch.",
             why=f"On this body act: {', '.join(map(str, kinds)) or 'nothing that its description tells'}.",
-            fix="Use body.problem(SphereProbe(…)); `palpate.sweep` takes any other problem.",
+            fix="Use body.problem(SphereProbe(…)) or a SurfaceTool; `palpate.sweep` takes any other problem.",
         )
     return False
 

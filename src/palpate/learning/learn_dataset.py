@@ -26,11 +26,12 @@ from palpate.learning.dataset_answers import DatasetAnswers
 from palpate.learning.energy import EnergyHistory, SuspectSolve, learn_energy
 from palpate.learning.fields import LearntField, LearntModes, learn_modes
 from palpate.learning.learning_history import History
+from palpate.learning.lumps import LumpPresses, learn_lumps
 from palpate.learning.plastic import MemoryFit
-from palpate.learning.recognised import Request, recognise
+from palpate.learning.recognised import Recognised, Request, recognise
 from palpate.learning.search import Budget
 from palpate.options import FieldOptions, FitOptions, SearchOptions, takes
-from palpate.surrogates import Surrogate
+from palpate.surrogates import LearntQuantities, Surrogate
 from palpate.surrogates.model_card import suspect_sentences
 
 __all__ = ["LearningHistory", "filter_record", "learn"]
@@ -38,6 +39,8 @@ __all__ = ["LearningHistory", "filter_record", "learn"]
 # fields that are learnt where a dataset has them, with what they are called and their units
 _SHOWN = {"displacement": ("displacement", "m"), "von_mises": ("von Mises stress", "Pa")}
 _FIELD_SHARE = 0.25  # of the energy's limit on time, for each field: most of a shape is found at once
+
+_LEAST_EFFORT = 0.5  # of a fit's own: numbers beside an energy take a second
 
 Log = Callable[[str], None]
 
@@ -221,12 +224,35 @@ def learn(
         meta["suspects"] = [vars(one) for one in found.suspects]
     if excluded:
         meta["excluded"] = excluded
+    beside = _learn_beside(known, options, limit(1.0), log)
     memory, fit = (None, None) if known.memory is None else known.memory(energy)
     if memory is not None:
         del meta["solves"]  # a history is none
-    surrogate = Surrogate(energy, {**known.fields, **{k: v.field for k, v in learnt.items()}}, memory, meta)
+    lumps = learn_lumps(LumpPresses.of(train), log) if "lump_energy" in train else None
+    drawn = {**known.fields, **{k: v.field for k, v in learnt.items()}}
+    surrogate = Surrogate(energy, drawn, memory, meta, _quantities(beside), lumps=lumps)
     spent = time.monotonic() - began
-    return surrogate, LearningHistory(found, solves, spent, learnt, known.filter, memory=fit)
+    return surrogate, LearningHistory(
+        found, solves, spent, learnt, known.filter, quantities=beside, memory=fit
+    )
+
+
+def _learn_beside(
+    known: Recognised, options: SearchOptions, seconds: float | None, log: Log
+) -> dict[str, Fitted]:
+    """Return the numbers that are learnt beside an energy, by the names of their groups."""
+    fitted: dict[str, Fitted] = {}
+    for name, learn_numbers in known.numbers.items():
+        log(f"learning the {name}")
+        effort = FitOptions().effort * max(options.effort, _LEAST_EFFORT)
+        part = learn_numbers(FitOptions(effort=effort, seconds=seconds, seed=options.seed))
+        if part is not None:
+            fitted[name] = part
+    return fitted
+
+
+def _quantities(numbers: Mapping[str, Fitted]) -> dict[str, LearntQuantities]:
+    return {group: part for group, one in numbers.items() for part in one.surrogate().quantities.values()}
 
 
 def _kept_rows(train: Dataset, leave_out: Sequence[int]) -> tuple[np.ndarray, list[int]]:
@@ -290,9 +316,7 @@ def _learn_answers(
     surrogate = Surrogate(
         fields={shown: one.field for shown, one in fields.items()},
         meta=meta,
-        quantities={
-            group: part for group, one in numbers.items() for part in one.surrogate().quantities.values()
-        },
+        quantities=_quantities(numbers),
     )
     spent = time.monotonic() - began
     return surrogate, LearningHistory(

@@ -23,11 +23,13 @@ from palpate.format import count
 from palpate.learning.dataset_symmetry import declared_symmetry, widen_ranges
 from palpate.learning.fields import LearntField, Snapshots, learn_snapshots, lumped_mass
 from palpate.learning.kept_surface import touched_overlap, touched_surface
+from palpate.learning.learn_arm import learn_arm
 from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_region
 from palpate.learning.recognised import Recognised, Request, recogniser
 from palpate.options import FieldOptions
 from palpate.surrogates import Baseline, ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
 from palpate.surrogates.baselines import OverlapBaseline, ToolBaseline, deepest_ball, depth_series
+from palpate.surrogates.learnt_torque import ARM
 from palpate.tools import PosedTool
 from palpate.units import Range
 
@@ -79,6 +81,7 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
             radius_input=pressed.radius_input,
             options=field,
             drawn=pressed.drawn,
+            shift=pressed.shift,
         )
 
     own, options = request.split("law", "length", "deviation")
@@ -91,7 +94,16 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
     deepest = {"deepest": pressed.deepest or None}
     # a law that was asked for is taken as it is
     rivals = None if options.get("choose") is False else pressed.overlap_baselines
-    return Recognised(baseline, pressed.solves, deepest | options, learn_field, rivals=rivals, region=region)
+    numbers = {} if pressed.tool is None else {ARM: partial(learn_arm, pressed.data, pressed.inputs)}
+    return Recognised(
+        baseline,
+        pressed.solves,
+        deepest | options,
+        learn_field,
+        rivals=rivals,
+        region=region,
+        numbers=numbers,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +131,7 @@ class PressedSolves:
         None  # the body's own surface, of a file; its triangles are then in four parts
     )
     tool: str | None = None  # description of a tool as JSON; None of a sphere
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # way from the place to the ball's centre, m
 
     @classmethod
     def of(cls, data: Dataset, layout: Layout | None = None) -> PressedSolves:
@@ -170,6 +183,7 @@ class PressedSolves:
             None if rim is None else (rest[triangles[touched]], rest[triangles[~touched]]),
             drawn,
             None if tool is None else json.dumps(tool.describe(), sort_keys=True),
+            (float(shift[0]), float(shift[1]), float(shift[2])),
         )
 
     @property

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.dataset import Dataset, Layout
+from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.fields import LearntField
 from palpate.learning.learning_history import History
 from palpate.learning.painted_region import PaintedRegion
-from palpate.options import FieldOptions, SearchOptions
+from palpate.options import FieldOptions, FitOptions, SearchOptions
 from palpate.surrogates import Baseline, LearntEnergy, NodeField, Solves
 from palpate.surrogates.baselines import registered_baselines
 from palpate.surrogates.memories import Memory
@@ -63,6 +64,8 @@ class Recognised:
     )
     # the memory beside an energy that was learnt, and how well it fits
     memory: Callable[[LearntEnergy], tuple[Memory, MemoryFit]] | None = None
+    # numbers beside the energy, by the names of their groups
+    numbers: Mapping[str, Callable[[FitOptions], Fitted | None]] = field(default_factory=dict)
 
 
 Recogniser = Callable[[Dataset, Request], Recognised | None]

@@ -33,7 +33,7 @@ class Blend:
 
     def __init__(self, old: HandEvaluator, new: HandEvaluator) -> None:
         self._old, self._new, self.share = old, new, 0.0
-        self.force, self.tangent = np.zeros(3), np.zeros((3, 3))
+        self.force, self.tangent, self.torque = np.zeros(3), np.zeros((3, 3)), np.zeros(3)
         self.contact, self.loads = np.zeros(3), np.zeros(len(new.loads))
         self.shift, self._place = np.zeros(3), np.zeros(3)
         self.away, self.indentation = old.away, new.indentation
@@ -87,6 +87,7 @@ class Blend:
         for mixed, first, second in (
             (self.contact, old.contact, new.contact),
             (self.loads, old.loads, new.loads),
+            (self.torque, old.torque, new.torque),
         ):
             np.subtract(second, first, out=mixed)
             mixed *= share

@@ -42,6 +42,11 @@ class Model(Protocol):
         """The inputs that the hand doesn't supply."""
         ...
 
+    @property
+    def tool_axis(self) -> np.ndarray:
+        """The axis (3,) of the tool that the hand moves, a unit vector; z of any other body."""
+        ...
+
     def evaluator(self) -> HandEvaluator:
         """Return the allocation-free evaluator."""
         ...
@@ -60,9 +65,10 @@ class HandEvaluator:
     touches; `inner` is how far inside it the probe's centre may go, m, infinite for a body that never lets go; `radius`
     is the probe's, m, unless it is the further input of number `radius_input`; `places` are those further inputs that a
     hand which holds can't change: they say where it has taken hold. `further` is the number of further inputs of a body
-    under a tool with friction; one more after them is its coefficient. One for a `few` places interprets kernels.
+    under a tool with friction; one more after them is its coefficient. One for a `few` places interprets kernels. Of a
+    tool that tells its torque, `torque_at` is as `palpate.surrogates.Surrogate.torque_evaluator` gives it.
 
-    Its answer: `force` (3,), N, on the hand; `contact` (3,), m, the probe's centre or the offset of the held place from
+    Its answer: `force` (3,), N, on the hand; `torque` (3,), N m, on the tool about its place, zero where none is told; `contact` (3,), m, the probe's centre or the offset of the held place from
     its rest; `loads` (n,), the inputs of the field at its nodes there, such as loads, N; `inside` the trained region or
     not; `let_go` where the body has let go of a probe that is still in it; `stiffness`, −F·(∂F/∂x)F/‖F‖², N/m, along
     the force of the elastic answer, zero without force or where it isn't known; `depth`, m, of the rigid probe in the
@@ -90,8 +96,11 @@ class HandEvaluator:
         node: Any = None,
         places: tuple[int, ...] = (),
         further: int | None = None,
+        torque_at: Any = None,
         few: bool = False,
     ) -> None:
+        self._torque_at = torque_at
+        self.torque: np.ndarray = np.zeros(3) if torque_at is None else torque_at.torque
         self._elastic, self._memory, self._holds = elastic, memory, holds
         self.away = np.zeros(3) if away is None else away
         self._normal = np.array([0.0, 0.0, 1.0]) if normal is None else normal
@@ -221,6 +230,8 @@ class HandEvaluator:
         untouched = self.let_go or (self.waiting and not self._holds)
         self.depth = 0.0 if untouched else elastic.depth
         self.stiffness = self._stiffness_along(elastic.force, elastic.stiffness)
+        if self._torque_at is not None:
+            self._torque_at(position, parameters, self.force)
         if not good:
             self.force[:] = math.nan  # the loop makes a fault of it
 

@@ -34,6 +34,7 @@ from palpate.errors import DeviceLostError, DeviceStopError, UsageError
 from palpate.runtime.blending import Blend
 from palpate.runtime.coupling import STEPS, Coupling
 from palpate.runtime.hand_evaluator import HandEvaluator, Model
+from palpate.runtime.hand_turn import HandTurn, TorqueOnHand
 from palpate.runtime.oscillation import OscillationWatch
 from palpate.runtime.passivity import PassivityController
 from palpate.runtime.publisher import Publisher
@@ -52,6 +53,7 @@ _PAUSE = 0.05  # s between two ticks of a page or script from which on the clock
 _AHEAD = 2e-3
 EDGE = 1.25  # radii of the workspace: no force beyond
 _AIR, _REST = 0.01, 0.05  # radii: as good as outside a pressed body, and as good as at rest of a held one
+_UP = np.array([0.0, 0.0, 1.0])
 _DELAY_TIME = 0.1  # s, over which the age of the samples is averaged
 _DELAY_CHANGE = 0.02  # of T/2 + d: smaller changes move no bound that matters
 
@@ -103,6 +105,7 @@ class Loop:
         self._prepare_safety(dead_man)
         self._prepare(limits, rate, stiffness, override, control)
         self.parameters = np.array([(r.low + r.high) / 2.0 for r in model.parameters])
+        self._prepare_turn(model, limits)
         self.fault, self.now, self.holding = Fault.NONE, 0.0, False
         self.device_error = ""
         self._answered, self._sent = math.inf, np.zeros(3)
@@ -148,6 +151,20 @@ class Loop:
         self._steps = 1 if self.evaluator.remembers else STEPS
         self._own_delay = self.bounds.delay
         self.take_delay(self._own_delay)
+
+    def _prepare_turn(self, model: Model, limits: Limits) -> None:
+        """Make what turns a tool with the hand, and what renders its torque, where the device has either."""
+        traits, upright = self.device.traits, self.workspace.upright
+        self.turn: HandTurn | None = None
+        self.turn_torque: TorqueOnHand | None = None
+        self._turn_sent, self._turn_seen = np.zeros(3), math.nan
+        axis = getattr(model, "tool_axis", _UP)
+        if traits.orients or traits.max_torque > 0.0:
+            self.turn = HandTurn(traits.axes, upright, model.parameters, axis)
+        if traits.max_torque > 0.0:
+            largest, scale = min(traits.max_torque, limits.max_torque), self.workspace.scale
+            controlled = traits.mass if self.controlled else 0.0
+            self.turn_torque = TorqueOnHand(largest, self.period, scale, controlled)
 
     def take_delay(self, delay: float) -> None:
         """Draw the consequences of a delay, s: for the coupling's spring, the ledger and the added damping."""
@@ -289,8 +306,19 @@ class Loop:
                 self.fail(Fault.IMPOSSIBLE_PLACE)
         if self.fault is Fault.NONE and not self._check.doubts:  # a doubted place: the last good one stays
             self.frame.to_hand(sample.position, self.out.hand, clutched=sample.clutched)
+            if self.turn is not None and self.device.traits.orients:
+                self._see_turn(sample.orientation)
             if self.motors and not late and not self.rest.resting:
                 self._measure_delay(self.now - sample.time)
+
+    def _see_turn(self, orientation: np.ndarray) -> None:
+        """Turn the tool with the hand, or fail where no wrist could have turned so."""
+        assert self.turn is not None
+        elapsed = self.now - self._turn_seen if math.isfinite(self._turn_seen) else self.period
+        self._turn_seen = self.now
+        self.turn.see(orientation, elapsed, holding=self.holding)
+        if self.turn.fault and self.holding:
+            self.fail(Fault.IMPOSSIBLE_PLACE)
 
     def guard(self) -> None:
         """Heed a person's stop and the dead-man button, and release the body for as long as they ask."""
@@ -326,6 +354,8 @@ class Loop:
             wish = float(self._wished[i])
             if math.isfinite(wish):
                 self.parameters[i] = wish
+        if self.turn is not None:
+            self.turn.into(self.parameters)
 
     def evaluate(self) -> None:
         """Ask the learnt body, and decide whether its force may be felt."""
@@ -350,7 +380,10 @@ class Loop:
             self.fail(Fault.EVALUATOR_ERROR)
             return
         if math.isfinite(
-            sum(answer.force.tolist()) + sum(answer.contact.tolist()) + sum(answer.loads.tolist())
+            sum(answer.force.tolist())
+            + sum(answer.contact.tolist())
+            + sum(answer.loads.tolist())
+            + sum(answer.torque.tolist())
         ):
             self.out.answer(answer)
         else:
@@ -401,11 +434,30 @@ class Loop:
                 controller.amend(sent)
             if self.motors and self.oscillation.see(sent, controller.stiffness * controller.noise):
                 self.fail(Fault.UNSTABLE)
-                self.stop.stopped = True  # it would begin again
-                self.safety.stop()
-                self._stop_sending()
+                self._stop_swinging()
+        self._control_torque()
         self._before = self.now
         self.out.passivity(controller)
+
+    def _stop_swinging(self) -> None:
+        """Stop what has become unstable, until a person resumes: it would begin again."""
+        self.stop.stopped = True
+        self.safety.stop()
+        self._stop_sending()
+
+    def _control_torque(self) -> None:
+        """Limit the torque and count its work, where the device renders one; publish the tool's own otherwise."""
+        gate = self.open and self.fault is Fault.NONE
+        answer, turn, torque = self.evaluator, self.turn, self.turn_torque
+        if turn is None or torque is None:
+            np.multiply(answer.torque, float(gate), out=self.out.torque)
+            return
+        elapsed, free = self.now - self._before, not answer.torque.any() and not torque.torque.any()
+        if not torque.send(answer.torque, turn.angle, elapsed, 0.0, gate=gate, free=free):
+            self.fail(Fault.UNSTABLE)
+            self._stop_swinging()
+        self.out.torque[:] = torque.torque
+        turn.torque_to_device(torque.torque, self._turn_sent)
 
     def _stop_sending(self) -> None:
         """Send zero force."""
@@ -422,8 +474,13 @@ class Loop:
         """Push on the hand."""
         self.frame.to_device(self._sent, self._sent_to_device)
         try:
-            self.device.write(self._sent_to_device)
+            if self.turn_torque is None:
+                self.device.write(self._sent_to_device)
+            else:
+                self.device.write(self._sent_to_device, self._turn_sent)
         except Exception as error:  # noqa: BLE001 - as for `read`
+            if self.turn_torque is not None:
+                self.turn_torque.stop()
             self.safety.stop()  # nobody knows what was sent: don't claim it, and ramp in again
             self.passivity.amend()
             self.device_failed(error)

@@ -19,7 +19,8 @@ _EVERY = 100  # ticks between two updates of the rate: 10 Hz is what an eye can 
 
 
 class Publisher:
-    """Fills and publishes state and indentations; the stages write to its views `hand`, `position` and `force` (3,).
+    """Fills and publishes state and indentations; the stages write to its views `hand`, `position`, `force` and
+    `torque` (3,).
 
     `record`, of dtype `STATE` and shape (), is the tick that is being filled. `offset`, s, is added to the time that is
     published: a replay that others look at has times of its own.
@@ -31,6 +32,7 @@ class Publisher:
         self._indentation, self._amplitude = shared.indentation, shared.indentation.record["amplitude"]
         self.record = record
         self.hand, self.position, self.force = record["hand"], record["position"], record["force"]
+        self.torque = record["torque"]
         self._loads = record["loads"][:inputs]
         # views are written to in a tenth of the time that the record takes
         self._views = {name: record[name] for name in STATE.names or ()}

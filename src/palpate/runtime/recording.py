@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from palpate.devices.device import Device, Sample, Traits
+from palpate.devices.device import NO_TORQUE, Device, Sample, Traits
 from palpate.devices.tick_record import BITS, FLAGS, TICK
 from palpate.network import shared_memory
 from palpate.runtime.realtime import obtain_beside
@@ -35,7 +35,18 @@ if TYPE_CHECKING:
 
 __all__ = ["RecordedDevice", "Ring", "TickRecorder"]
 
-_AS_PUBLISHED = ("tick", "hand", "position", "contact", "force", "depth", "stiffness", "delay", "coupling")
+_AS_PUBLISHED = (
+    "tick",
+    "hand",
+    "position",
+    "contact",
+    "force",
+    "torque",
+    "depth",
+    "stiffness",
+    "delay",
+    "coupling",
+)
 
 _SECONDS, _LEAST = 4.0, 4096  # s of ticks that the ring holds, and ticks at the least
 _FASTEST = 10_000.0  # Hz; a loop at a higher rate is refused, and needs no room before that
@@ -176,7 +187,9 @@ class RecordedDevice:
     def __init__(self, device: Device, record: np.ndarray) -> None:
         self.device = device
         self._position, self._sent = record["sample_position"], record["sent"]
+        self._orientation, self._torque = record["sample_orientation"], record["sent_torque"]
         self._time, self._patience = record["sample_time"], record["patience"]
+        self._turns, self._renders = device.traits.orients, device.traits.max_torque > 0.0
         self.flags = 0
 
     @property
@@ -189,6 +202,8 @@ class RecordedDevice:
         self.flags = BITS["read_failed"]
         sample = self.device.read(now)
         self._position[:] = sample.position
+        if self._turns:
+            self._orientation[:] = sample.orientation
         self._time[()], self._patience[()] = sample.time, sample.patience
         self.flags = (
             (BITS["holding"] if sample.holding else 0)
@@ -197,11 +212,15 @@ class RecordedDevice:
         )
         return sample
 
-    def write(self, force: np.ndarray) -> None:
-        """Push with the device, and note the force."""
+    def write(self, force: np.ndarray, torque: np.ndarray = NO_TORQUE) -> None:
+        """Push and turn with the device, and note force and torque."""
         self._sent[:] = force
+        self._torque[:] = torque
         self.flags |= BITS["write_failed"]
-        self.device.write(force)
+        if self._renders:
+            self.device.write(force, torque)
+        else:
+            self.device.write(force)
         self.flags &= ~BITS["write_failed"]
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.devices.device import Sample, Traits
+from palpate.devices.device import NO_TORQUE, Sample, Traits
 from palpate.devices.tick_record import BITS
 from palpate.devices.trace_file import Trace, TraceWriter
 from palpate.errors import DeviceError, DeviceLostError, DeviceStopError, FileFormatError, UsageError
@@ -75,12 +75,13 @@ def _stated(figures: dict[str, Any]) -> dict[str, Any]:
 class ReplayDevice:
     """A device that says what a recorded one, of the same traits, said in the tick `row` of dtype `TICK`.
 
-    `dead_man` tells whether a dead-man button was asked for; `sent` (3,) is the latest force, N, in the device's axes.
+    `dead_man` tells whether a dead-man button was asked for; `sent` (3,) is the latest force, N, and `turned` (3,) the
+    latest torque, N m, in the device's axes.
     """
 
     def __init__(self, traits: Traits, *, dead_man: bool = False) -> None:
         self.traits, self.row, self.dead_man = traits, None, dead_man
-        self.sample, self.sent = Sample(), np.zeros(3)
+        self.sample, self.sent, self.turned = Sample(), np.zeros(3), np.zeros(3)
 
     row: Any
 
@@ -91,6 +92,8 @@ class ReplayDevice:
         if flags & BITS["read_failed"]:
             raise _ERRORS.get(int(row["fault"]), DeviceError)("The recorded device failed here.")
         sample.position[:] = row["sample_position"]
+        if self.traits.orients:
+            sample.orientation[:] = row["sample_orientation"]
         sample.time, sample.patience = float(row["sample_time"]), float(row["patience"])
         sample.holding = bool(flags & BITS["holding"])
         sample.clutched = bool(flags & BITS["clutched"])
@@ -98,9 +101,10 @@ class ReplayDevice:
         sample.buttons = 1 if self.dead_man and not flags & BITS["released"] else 0
         return sample
 
-    def write(self, force: np.ndarray) -> None:
-        """Remember the force (3,), N; raise a DeviceError where the recorded driver failed."""
+    def write(self, force: np.ndarray, torque: np.ndarray = NO_TORQUE) -> None:
+        """Remember force (3,), N, and torque (3,), N m; raise a DeviceError where the recorded driver failed."""
         self.sent[:] = force
+        self.turned[:] = torque
         if self.row is not None and int(self.row["flags"]) & BITS["write_failed"]:
             raise _ERRORS.get(int(self.row["fault"]), DeviceError)("The recorded device failed here.")
 
@@ -239,7 +243,7 @@ class Replayed:
         """Indices of the ticks whose force, force in the device's axes or fault has other bits."""
         old, new = self.trace.ticks, self.ticks
         other = new["fault"] != old["fault"]
-        for name in ("force", "sent"):
+        for name in ("force", "sent", "torque", "sent_torque"):
             other |= (
                 np.ascontiguousarray(new[name]).view(np.int64)
                 != np.ascontiguousarray(old[name]).view(np.int64)

@@ -102,9 +102,10 @@ class Limits:
     ramp: float = _SHORTEST_RAMP  # s in which the force grows after a grab, at least 0.05
     # N, largest force that the motors bear for long; infinite where the device states none
     continuous: float = math.inf
+    max_torque: float = math.inf  # N m, largest ‖τ‖ of a device that renders one, beside its own
 
     def __post_init__(self) -> None:
-        positive = self.max_force > 0.0 and self.continuous > 0.0
+        positive = self.max_force > 0.0 and self.continuous > 0.0 and self.max_torque > 0.0
         if not (positive and self.max_force < math.inf and 0.0 <= self.slew < math.inf):
             raise UsageError(
                 f"A force limit of {self.max_force:g} N and a slew of {self.slew:g} N/s protect nobody.",

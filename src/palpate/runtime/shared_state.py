@@ -89,6 +89,7 @@ class State:
     position: _Vector  # m, body: offset from the touched node's rest position, or the probe's centre
     contact: _Vector  # m, body: where the touched node is, or the probe's centre
     force: _Vector  # N on the hand, as sent, in the body's axes
+    torque: _Vector  # N m on a tool about its place, in the body's axes: as sent, or as it would be felt
     depth: _Number  # m, of a probe in the surface at rest; 0 for a body held at a node
     stiffness: _Number  # N/m, felt along the force in body metres; 0 where it isn't known
     loads: Annotated[np.ndarray, "f8", MAX_INPUTS]  # N, the loads that hold the body there

@@ -37,7 +37,8 @@ _OUTSIDE = {
     "_constants",
     "_posterior",
 }
-_LATER = {"passivity.added"}  # what older recordings do not have: it begins as in a new loop
+# what older recordings do not have: it begins as in a new loop
+_LATER = ("passivity.added", "evaluator.torque", "evaluator._torque_at", "turn", "_turn")
 _NUMBERS = (bool, int, float, np.number, type(None))
 
 _Entry = tuple[str, Any, Callable[[Any], None]]
@@ -57,7 +58,7 @@ def restore(loop: Loop, values: Mapping[str, Any]) -> None:
     if "bounds.delay" in values:
         loop.take_delay(float(values["bounds.delay"]))
     for path, now, put in list(_entries(loop)):
-        if path != "bounds.delay" and not (path in _LATER and path not in values):
+        if path != "bounds.delay" and not (path.startswith(_LATER) and path not in values):
             _put(path, now, put, values.get(path))
 
 

@@ -24,12 +24,15 @@ from palpate.devices import device_traits
 from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
-from palpate.surrogates import Field, LearntEnergy, NodeField, Surrogate, TouchedSurface
+from palpate.surrogates import Field, LearntEnergy, LearntQuantities, NodeField, Surrogate, TouchedSurface
+from palpate.surrogates.baselines import deepest_ball
 from palpate.surrogates.fields import line_of
+from palpate.surrogates.learnt_torque import ARM, torque_evaluator
 from palpate.surrogates.memories import Friction, Memory
 from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.surrogate import correction_count, correction_warning
 from palpate.surrogates.tool_friction import with_friction
+from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 
 __all__ = ["FRICTION", "Touchable", "aim_device", "load_touchable", "touchable"]
@@ -52,6 +55,7 @@ class Touchable:
     name: str = "body"  # of the body, as pages and reports call it
     memory: Memory | None = None  # what it remembers of how it was touched
     meta: Mapping[str, Any] = field(default_factory=dict)  # what the file says of its making
+    arm: LearntQuantities | None = None  # torque per newton about a tool's place, where that is learnt
 
     def __str__(self) -> str:
         return f"Touchable {self.name}: {self.energy}"
@@ -90,6 +94,20 @@ class Touchable:
         return self.energy.baseline.surface
 
     @property
+    def tool(self) -> PosedTool | None:
+        """The rigid tool that presses, in the orientation in which its further inputs find it; None of a ball."""
+        tool = getattr(self.energy.baseline, "posed_tool", None)
+        return tool if isinstance(tool, PosedTool) else None
+
+    @cached_property
+    def shift(self) -> np.ndarray:
+        """Way (3,) in m from a tool's place to the centre of the ball whose depth counts; zero of a ball.
+
+        `surface` is the body's less this way, so that it takes places.
+        """
+        return np.zeros(3) if self.tool is None else deepest_ball(self.tool, self.normal)[1]
+
+    @property
     def holds(self) -> bool:
         """True where the hand holds a patch or a node of the body, and doesn't move a free probe."""
         return bool(self.energy.baseline.holds)
@@ -103,6 +121,12 @@ class Touchable:
     def line(self) -> NodeField | None:
         """The displacement of a body that is drawn as a line of nodes, of which a hand holds one; otherwise None."""
         return line_of(self.fields)
+
+    @property
+    def tool_axis(self) -> np.ndarray:
+        """The tool's own axis (3,), a unit vector; z of a probe that has none."""
+        turn = getattr(getattr(self.energy.baseline, "posed_tool", None), "turn", None)
+        return np.array([0.0, 0.0, 1.0]) if turn is None else np.ascontiguousarray(turn[:, 2])
 
     @property
     def stays(self) -> bool:
@@ -265,6 +289,7 @@ class Touchable:
             radius=self.energy.baseline.radius,
             radius_input=self.radius_parameter,
             further=len(self.energy.parameters),
+            torque_at=torque_evaluator(self.energy, self.arm),
             few=few,
         )
 
@@ -350,7 +375,8 @@ def touchable(model: Surrogate, name: str = "") -> Touchable:
             " with a warning" if correction_warning(model.meta) else ""
         )
     fields = {name: shown for name, shown in model.fields.items() if shown.carrier != "places"}
-    return Touchable(model.hand_energy, fields, known, model.memory, model.meta)
+    arm = model.quantities.get(ARM)
+    return Touchable(model.hand_energy, fields, known, model.memory, model.meta, arm)
 
 
 def load_touchable(path: str | os.PathLike[str], friction: float | None = None) -> Touchable:

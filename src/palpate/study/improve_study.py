@@ -15,7 +15,6 @@ from palpate.improvement import ImprovementStep, improve
 from palpate.improvement.improve import Interest
 from palpate.options import ImprovementOptions, takes
 from palpate.study.mesh_check import load_finer, mesh_part, solve_finer
-from palpate.study.probe_kind import ProbeSweepRecord
 from palpate.study.run import (
     Log,
     Outcome,
@@ -27,6 +26,7 @@ from palpate.study.run import (
     validate_study,
     with_validation,
 )
+from palpate.study.stage_records import PressSweepRecord
 from palpate.study.study import Study
 from palpate.study.study_advice import earlier_curve
 from palpate.sweeps import local_cluster
@@ -55,7 +55,7 @@ def improve_study(
     Seed and workers are those of the study. `interest` takes inputs (C, n) of places and returns how much an error
     there counts, (C,), such as where a hand goes. `progress` is of each batch.
     """
-    if not isinstance(study.sweep, ProbeSweepRecord) or study.test is None:
+    if not isinstance(study.sweep, PressSweepRecord) or study.test is None:
         raise UsageError(
             f"The solves of {study.name!r} can't be chosen one by one.",
             why="That takes a solid body under a probe, whose force is learnt from each place.",

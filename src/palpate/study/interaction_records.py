@@ -6,12 +6,13 @@ from typing import Any
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from palpate.physics.interactions.sphere import RIGID
 from palpate.physics.shapes.naming import members
 from palpate.physics.solid.body_family import BESIDE, UNITS
 from palpate.records import Number, Record, in_si
 from palpate.study.body_records import BodyRecord
 
-__all__ = ["OnSurface", "VariedRecord", "require_corners"]
+__all__ = ["OnSurface", "VariedRecord", "require_corners", "stiffness_or_rigid"]
 
 
 class OnSurface(Record):
@@ -35,6 +36,16 @@ def require_corners(over: tuple[Any, Any] | None) -> None:
             "the corners of `over` are not in order: the lower one comes first; for example "
             '[["30 mm", "30 mm"], ["70 mm", "70 mm"]]'
         )
+
+
+def stiffness_or_rigid(pad: Any) -> Any:
+    """Return the word of a rigid ball or tool, or a positive stiffness of its pad in N/m³."""
+    if isinstance(pad, str) and pad.strip().lower() == RIGID:
+        return RIGID
+    stiffness = in_si(pad, "N/m^3")
+    if not stiffness > 0:
+        raise ValueError(f'{stiffness:g} is no stiffness of a pad: give one above 0, or "rigid"')
+    return stiffness
 
 
 class VariedRecord(Record):

@@ -17,8 +17,8 @@ from palpate.files import restore_folder, write_file
 from palpate.format import count, millimetres, share
 from palpate.physics.solid.finer_problem import FINER, finer_problem
 from palpate.processes import CASE_LIMIT
-from palpate.study.probe_kind import ProbeSweepRecord, ProbeTestRecord
-from palpate.study.stage_records import TouchTargetRecord
+from palpate.study.probe_kind import ProbeTestRecord
+from palpate.study.stage_records import PressSweepRecord, TouchTargetRecord
 from palpate.study.study import Study
 from palpate.study.study_paths import Paths
 from palpate.sweeps import sweep
@@ -86,7 +86,7 @@ def refine_study(
     the size follows from it; elements that are fine enough stay, and none becomes smaller than half. A study in which
     no ball touches is refused.
     """
-    if not isinstance(study.sweep, ProbeSweepRecord) or not isinstance(study.target, TouchTargetRecord):
+    if not isinstance(study.sweep, PressSweepRecord) or not isinstance(study.target, TouchTargetRecord):
         raise UsageError(
             f"The elements of {study.name} can't be chosen by touches.",
             why="No ball touches its body.",

@@ -1,4 +1,4 @@
-"""Studies that have a name: beams, beams with memory, bodies to be pressed, a body held by a pad.
+"""Studies that have a name: beams, beams with memory, bodies pressed by a ball or a fingertip, one held by a pad.
 
 Most have a quick form, which shows the whole way within two minutes: coarse elements, few solves, less depth. It asks
 for less, since it shows the way and not what can be reached.
@@ -68,6 +68,17 @@ _SOLIDS: dict[str, dict[str, Any]] = {
         "interaction": {"depth": (2e-4, 0.010), "over": ((-0.03, -0.03), (0.03, 0.03)), "pad": 2e7},
         "sweep": {"samples": 80, "depths": 3, "element": 0.004},  # nothing thin is near the surface
     },
+    "fingertip": {
+        "body": {"kind": "block", "size": (0.10, 0.10, 0.05), "material": {"young": 9e3, "name": "tissue"}},
+        "interaction": {
+            "kind": "tool",
+            "shape": {"kind": "fingertip"},
+            "depth": (2e-4, 0.006),
+            "over": ((0.03, 0.03), (0.07, 0.07)),
+        },
+        "sweep": {"samples": 40, "depths": 4},
+        "test": {"samples": 24},
+    },
     "grasp": {
         "body": {"kind": "block", "size": (0.06, 0.06, 0.03), "material": {"young": 9e3, "name": "tissue"}},
         "interaction": {"kind": "pad", "radius": 0.012, "over": ((0.025, 0.025), (0.035, 0.035))},
@@ -83,6 +94,7 @@ _COARSE: dict[str, tuple[float, float, dict[str, Any]]] = {
     "breast-dome": (0.020, 0.010, {"depth": (2e-4, 0.006)}),
     "liver": (0.030, 0.012, {"depth": (2e-4, 0.008)}),
     "phantom": (0.020, 0.010, {"depth": (2e-4, 0.005)}),
+    "fingertip": (0.025, 0.005, {"depth": (2e-4, 0.004)}),
     "grasp": (0.020, 0.012, {}),
 }
 # thin layers and round bodies keep more elements, so that a solve takes longer; of liver and phantom it takes 5 s, and
@@ -101,6 +113,7 @@ _LESS: dict[str, dict[str, dict[str, Any]]] = {
         "sweep": {"samples": 16},
         "test": {"samples": 8},
     },
+    "fingertip": {"sweep": {"samples": 12}, "test": {"samples": 8}},
     "grasp": {"sweep": {"samples": 12}, "test": {"samples": 12}},
 }
 _QUICK: dict[str, Any] = {
@@ -191,7 +204,7 @@ def _quick_solid(name: str, content: dict[str, Any]) -> dict[str, Any]:
     content = _merged(content, _QUICK)
     content = _merged(content, {"name": name + QUICK, "body": {"element": coarse}, "interaction": acting})
     content["sweep"] = {"samples": 32, "element": element}
-    if content["interaction"].get("kind", "probe") == "probe":
+    if content["interaction"].get("kind", "probe") != "pad":
         content = _merged(content, {"sweep": {"depths": 2}, "test": {"depths": 4}})
     return _merged(content, _LESS.get(name, {}))
 

@@ -21,9 +21,11 @@ from palpate.record_complaints import complaints
 from palpate.study.material_records import SolidMaterialRecord
 from palpate.study.part_records import PartRecord
 from palpate.study.part_rim import with_rim
-from palpate.study.part_study import COARSE, HELD, TOUCHED, require_suitable_ball
+from palpate.study.part_study import HELD, TOUCHED, require_suitable_ball
+from palpate.study.part_tools import under_ball, under_tool
 from palpate.study.probe_kind import ProbeRecord
 from palpate.study.study import Study
+from palpate.study.tool_kind import ToolRecord
 
 if TYPE_CHECKING:
     from palpate.viewer.shown_part import PartChoices, ShownMaterial, ShownPart
@@ -58,8 +60,8 @@ def shown_part(study: Study) -> ShownPart:
             law=plain.law if plain else LAWS[0],
             young=plain.young if plain and plain.young else 10e3,
             poisson=plain.poisson if plain else 0.45,
-            radius=acting.radius,
             depth=acting.depth[1],
+            **_shown_tool(acting),
         ),
         units=tuple(UNITS) if body.unit else (),
         whole=bool(getattr(bare, "is_cad", False)),
@@ -80,6 +82,8 @@ def chosen_study(study: Study, choices: PartChoices) -> Study:
     held, touched, surfaces, fixed, touches = _picked(body, acting, skin, choices)
     _require_surfaces(held, touched)
     chosen = {"radius": choices.radius, "depth": choices.depth}
+    if choices.posed is not None:
+        del chosen["radius"]
     require_suitable_ball(body, skin.points[skin.triangles[touched]], chosen)
     least = float(f"{acting.depth[0] * choices.depth / acting.depth[1]:.6g}")
     content = study.model_dump()
@@ -88,21 +92,31 @@ def chosen_study(study: Study, choices: PartChoices) -> Study:
         "fixed": fixed,
         "material": _material(body, choices),
     }
-    if content["sweep"].get("element") is not None:  # coarser ones would not feel a smaller ball
-        content["sweep"]["element"] = min(content["sweep"]["element"], COARSE * choices.radius)
-    content["interaction"] |= {"touches": touches, "radius": choices.radius, "depth": (least, choices.depth)}
+    content["interaction"] |= {"touches": touches, "depth": (least, choices.depth)}
+    if choices.posed is None:
+        content = under_ball(content, choices.radius)
+    else:
+        content = under_tool(content, choices.tool, choices.posed)
     try:
         return with_rim(Study.model_validate(content))
     except ValidationError as error:
         raise UsageError(" ".join(complaints(error, Study)), fix="Change it on the page.") from error
 
 
-def _parts(study: Study) -> tuple[PartRecord, ProbeRecord]:
-    """Return body and interaction of a study of a part under a ball."""
+def _shown_tool(acting: ProbeRecord | ToolRecord) -> dict[str, Any]:
+    """Return what presses, as the choices of the page hold it."""
+    if isinstance(acting, ProbeRecord):
+        return {"radius": acting.radius}
+    posed = acting.build_tool()
+    return {"radius": posed.shape.size, "tool": acting.shape.kind, "posed": posed}
+
+
+def _parts(study: Study) -> tuple[PartRecord, ProbeRecord | ToolRecord]:
+    """Return body and interaction of a study of a part under a ball or tool."""
     body, acting = study.body, study.interaction
-    if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord):
+    if not isinstance(body, PartRecord) or not isinstance(acting, ProbeRecord | ToolRecord):
         raise UsageError(
-            f"The study {study.name} is not of a part under a ball.",
+            f"The study {study.name} is not of a part under a ball or a tool.",
             why="Only such a study is set up on the page.",
             fix="Carry it out with `palpate study`, and look at it with `palpate view`.",
         )
@@ -129,7 +143,7 @@ def _marked(names: np.ndarray, wanted: Sequence[str]) -> np.ndarray:
 
 
 def _picked(
-    body: PartRecord, acting: ProbeRecord, skin: BodyMesh, choices: PartChoices
+    body: PartRecord, acting: ProbeRecord | ToolRecord, skin: BodyMesh, choices: PartChoices
 ) -> tuple[np.ndarray, np.ndarray, list[dict[str, Any]], Any, str]:
     """Return what is held and touched as masks (t,), the named surfaces, the names that are held, and that touched."""
     names = _names(body)

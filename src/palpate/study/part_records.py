@@ -143,7 +143,7 @@ class PartSurfaceRecord(Record):
 class PartRecord(Record):
     """A part from a file: a surface such as STL or OBJ, CAD such as STEP, or a volume mesh such as VTU, MSH or INP."""
 
-    INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "pad")
+    INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "tool", "pad")
 
     kind: Literal["part"] = "part"
     file: str = Field(min_length=1, description="beside the study file", examples=["part.stl"])

@@ -21,9 +21,11 @@ from palpate.physics.shapes.mesh import BodyMesh, Face
 from palpate.record_complaints import complaints
 from palpate.study.part_records import PartRecord, part_shape
 from palpate.study.part_rim import with_rim
+from palpate.study.part_tools import COARSE, tool_depth, under_tool
 from palpate.study.probe_kind import ProbeRecord
 from palpate.study.study import Study
 from palpate.study.toml import to_toml
+from palpate.tools.tool_sizes import BALL, read_tool, sizes_of
 from palpate.units import parse_quantity
 
 __all__ = ["AUTO", "part_study", "part_text", "require_suitable_ball", "study_file", "study_name"]
@@ -45,7 +47,6 @@ LARGEST = 0.3  # radius over the least extent, for a large surface, at most
 CELLS = 300  # squares of an element's length on the footprint: about 15,000 unknowns, seconds a solve
 PLACES = 64  # at which the thickness beneath is measured
 NEAR = 1e-6  # of a triangle's size: nearer, a way meets the triangle that it begins at
-COARSE = 0.5  # element over the radius: coarser ones do not feel the ball
 COARSEST = 2.0  # element over the radius, at most, where somebody chooses it
 LEAST_DEPTH = 1 / 25  # least depth over the largest
 MARGIN = 3.0  # distance of places from the rim of the touched surface's box, in radii
@@ -112,8 +113,34 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     if options.depth is None:
         study = _suit_depth(study)
     study = with_rim(study)
+    if options.tool is not None:
+        study = with_tool(study, options)
     regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
+
+
+def with_tool(study: Study, options: PartOptions) -> Study:
+    """Return the study of a part under the tool of the options, in place of the ball that suits the part."""
+    from palpate.viewer.shown_part import require_room_for_tool
+
+    body, ball = study.body, study.interaction
+    assert isinstance(body, PartRecord)
+    assert isinstance(ball, ProbeRecord)
+    name, tool = read_tool(options.tool or BALL, ball.radius)
+    if tool is None:
+        return study
+    if options.radius is not None:
+        raise UsageError(
+            f"--radius is that of a ball, and a {name} presses.",
+            fix=f'Say its sizes with it, such as --tool "{name}, {next(iter(sizes_of(tool)))} 6 mm".',
+        )
+    low, high = body.bare().skin.corners
+    require_room_for_tool(tool, high - low)
+    content = under_tool(study.model_dump(), name, tool)
+    if options.depth is None:
+        deepest = tool_depth(tool.shape, ball.depth[1])
+        content["interaction"]["depth"] = (_nice(LEAST_DEPTH * deepest), deepest)
+    return _study_of(content)
 
 
 def _element_size(wanted: str | None, area: float, radius: float) -> float:

@@ -6,15 +6,13 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from palpate.learning.pressed_solves import FEWEST
 from palpate.physics import SphereProbe
-from palpate.physics.interactions.sphere import RIGID
 from palpate.physics.shapes.naming import members
 from palpate.physics.solid.body_symmetry import fundamental_part
-from palpate.records import Count, Metres, PadStiffness, Pair, Record, Triple, in_si
+from palpate.records import Count, Metres, PadStiffness, Pair, Record, Triple
 from palpate.study.body_records import BodyRecord
-from palpate.study.interaction_records import OnSurface, require_corners
-from palpate.study.stage_records import SECTIONS, EnergyLearningRecord, SweepRecord, TouchTargetRecord
+from palpate.study.interaction_records import OnSurface, require_corners, stiffness_or_rigid
+from palpate.study.stage_records import SECTIONS, EnergyLearningRecord, PressSweepRecord, TouchTargetRecord
 
 __all__ = ["ProbeLearningRecord", "ProbeRecord", "ProbeSweepRecord", "ProbeTestRecord"]
 
@@ -53,16 +51,7 @@ class ProbeRecord(OnSurface):
             return f"a {body.kind} has no surface {self.rim!r} to be the rim; it has {', '.join(known)}"
         return f"the rim {self.rim!r} is held" if self.rim in body.fixed_names() else ""
 
-    @field_validator("pad", mode="before")
-    @classmethod
-    def _stiffness_or_rigid(cls, pad: Any) -> Any:
-        """Return the word of a rigid ball, or a positive stiffness in N/m³."""
-        if isinstance(pad, str) and pad.strip().lower() == RIGID:
-            return RIGID
-        stiffness = in_si(pad, "N/m^3")
-        if not stiffness > 0:
-            raise ValueError(f'{stiffness:g} is no stiffness of a pad: give one above 0, or "rigid"')
-        return stiffness
+    _stiffness = field_validator("pad", mode="before")(stiffness_or_rigid)
 
     @model_validator(mode="after")
     def _in_order(self) -> ProbeRecord:
@@ -88,28 +77,10 @@ class ProbeRecord(OnSurface):
         return probe if whole else fundamental_part(body, probe)
 
 
-class ProbeSweepRecord(SweepRecord):
+class ProbeSweepRecord(PressSweepRecord):
     """Touches that are solved: depth series, each from shallow to deep."""
 
-    samples: Count = Field(40, ge=FEWEST, description="number of solves")
-    depths: Count = Field(5, ge=1, description="solves in a depth series")
     symmetric: bool = Field(True, description="solve a part only, where mirror images give the rest")
-    element: Metres | None = Field(
-        None,
-        gt=0,
-        description="size of elements under the ball; left out: half its radius, less on round and layered bodies",
-        examples=["4 mm"],
-    )
-
-    @model_validator(mode="after")
-    def _whole_series(self) -> ProbeSweepRecord:
-        if self.depths > self.samples:
-            raise ValueError(f"{self.samples} solves make no depth series of {self.depths}")
-        return self
-
-    def arguments(self, problem: Any) -> dict[str, Any]:
-        """Return the arguments of `palpate.sweep` that say where to solve."""
-        return {"points": problem.design(self.samples, self.seed, depths=self.depths), "seed": self.seed}
 
 
 class ProbeTestRecord(Record):

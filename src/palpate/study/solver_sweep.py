@@ -20,7 +20,7 @@ from palpate.improvement import ImprovementStep, improve
 from palpate.learning.learn_dataset import learn
 from palpate.options import ImprovementOptions
 from palpate.study.solver_study import SolverStudy
-from palpate.sweeps import OnDemandCluster, Scheduler, Space, grow, random, sweep
+from palpate.sweeps import JobQueue, OnDemandCluster, Scheduler, Space, grow, random, sweep
 from palpate.sweeps.command_problem import READING
 
 __all__ = ["SolverSolves", "improve_solver", "sweep_solver"]
@@ -46,7 +46,7 @@ def sweep_solver(
     *,
     limit: float,
     progress: Any = True,
-    scheduler: Scheduler | None = None,
+    scheduler: Scheduler | JobQueue | None = None,
     announce: Callable[[str], None],
     log: Callable[[str], None] = lambda _: None,
 ) -> SolverSolves:
@@ -82,7 +82,7 @@ def improve_solver(
     folder: Path,
     *,
     options: ImprovementOptions,
-    scheduler: Scheduler | None = None,
+    scheduler: Scheduler | JobQueue | None = None,
     progress: Any = True,
     announce: Callable[[str], None],
     log: Callable[[str], None] = lambda _: None,
@@ -120,6 +120,8 @@ def improve_solver(
     problem.tidy()
 
 
-def _machines(study: SolverStudy, scheduler: Scheduler | None) -> contextlib.AbstractContextManager[Any]:
+def _machines(
+    study: SolverStudy, scheduler: Scheduler | JobQueue | None
+) -> contextlib.AbstractContextManager[Any]:
     """Return the machines that solve: those of a scheduler, else processes of this one, once they are needed."""
     return OnDemandCluster(study.sweep.workers) if scheduler is None else contextlib.nullcontext(scheduler)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field, model_validator
 
+from palpate.learning.pressed_solves import FEWEST
 from palpate.options import EnergyOptions, Options, declarations
 from palpate.records import Count, Metres, Newtons, Number, Record
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "SECTIONS",
     "EnergyLearningRecord",
+    "PressSweepRecord",
     "RuntimeRecord",
     "SweepRecord",
     "TouchTargetRecord",
@@ -51,6 +53,30 @@ class SweepRecord(Record):
     def arguments(self, problem: Any) -> dict[str, Any]:
         """Return the arguments of `palpate.sweep` that say where to solve."""
         return {"samples": self.samples, "seed": self.seed}
+
+
+class PressSweepRecord(SweepRecord):
+    """Touches that are solved: depth series, each from shallow to deep."""
+
+    samples: Count = Field(40, ge=FEWEST, description="number of solves")
+    depths: Count = Field(5, ge=1, description="solves in a depth series")
+    element: Metres | None = Field(
+        None,
+        gt=0,
+        description="size of elements under what presses; left out: half its radius, less on round and layered bodies "
+        "and under edges",
+        examples=["4 mm"],
+    )
+
+    @model_validator(mode="after")
+    def _whole_series(self) -> PressSweepRecord:
+        if self.depths > self.samples:
+            raise ValueError(f"{self.samples} solves make no depth series of {self.depths}")
+        return self
+
+    def arguments(self, problem: Any) -> dict[str, Any]:
+        """Return the arguments of `palpate.sweep` that say where to solve."""
+        return {"points": problem.design(self.samples, self.seed, depths=self.depths), "seed": self.seed}
 
 
 class EnergyLearningRecord(Record):

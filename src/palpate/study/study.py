@@ -25,14 +25,21 @@ from palpate.study.loads_kind import (
 from palpate.study.memory_kind import HistoryTargetRecord, MemoryRecord
 from palpate.study.pad_kind import PadRecord, PadSweepRecord, PadTestRecord
 from palpate.study.probe_kind import ProbeLearningRecord, ProbeRecord, ProbeSweepRecord, ProbeTestRecord
-from palpate.study.stage_records import SECTIONS, EnergyLearningRecord, RuntimeRecord, TouchTargetRecord
+from palpate.study.stage_records import (
+    SECTIONS,
+    EnergyLearningRecord,
+    PressSweepRecord,
+    RuntimeRecord,
+    TouchTargetRecord,
+)
+from palpate.study.tool_kind import ToolRecord, ToolSweepRecord
 
 __all__ = ["InteractionRecord", "Study"]
 
 _TABLES = ("sweep", "test", "filter", "learning", "target")
 
-InteractionRecord: TypeAlias = LoadsRecord | ProbeRecord | PadRecord
-Sweep: TypeAlias = LoadSweepRecord | ProbeSweepRecord | PadSweepRecord
+InteractionRecord: TypeAlias = LoadsRecord | ProbeRecord | ToolRecord | PadRecord
+Sweep: TypeAlias = LoadSweepRecord | ProbeSweepRecord | ToolSweepRecord | PadSweepRecord
 Test: TypeAlias = LoadTestRecord | ProbeTestRecord | PadTestRecord
 Learning: TypeAlias = LoadLearningRecord | ProbeLearningRecord | EnergyLearningRecord
 Target: TypeAlias = LoadTargetRecord | TouchTargetRecord | HistoryTargetRecord
@@ -140,8 +147,8 @@ class Study(Record):
 
     @property
     def presses(self) -> bool:
-        """True where a probe presses the body, which is else held."""
-        return isinstance(self.sweep, ProbeSweepRecord)
+        """True where a probe or a tool presses the body, which is else held."""
+        return isinstance(self.sweep, PressSweepRecord)
 
     def problem(self, *, whole: bool = False) -> Any:
         """Return the problem to solve: the body, or a family of bodies, under what acts on it.
@@ -154,7 +161,9 @@ class Study(Record):
         body: Any = self.body.build()
         element = self.sweep.element if self.sweep else None
         part = self.sweep is not None and self.sweep.symmetric and not whole
-        acting = self.interaction.build(body, whole=not part)
+        # a tool judges its edge by the size of the elements
+        sized: dict[str, Any] = {"element": element} if isinstance(self.interaction, ToolRecord) else {}
+        acting = self.interaction.build(body, whole=not part, **sized)
         varied = tuple(Varied(v.path, v.low, v.high) for v in self.varied)
         family: Any = BodyFamily(body, varied) if varied else body
         return family.problem(acting, **({} if element is None else {"element": element}))

@@ -19,7 +19,7 @@ from palpate.errors import UsageError
 from palpate.files import system_errors
 from palpate.study.study_paths import Paths
 
-__all__ = ["StudyLock", "hold_study"]
+__all__ = ["StudyLock", "hold_study", "work_on"]
 
 _OWNER_ONLY = 0o600  # the address of a page has its token in it
 _HELD = {
@@ -68,6 +68,32 @@ def hold_study(paths: Paths, work: str) -> Iterator[StudyLock]:
         if os.name == "nt":
             with contextlib.suppress(OSError):  # the next command has it open already
                 path.unlink(missing_ok=True)
+
+
+def work_on(paths: Paths) -> str:
+    """Return which command works on a study, such as "palpate sweep, process 17"; "" for none.
+
+    A lock that a killed command left behind counts for none.
+    """
+    says: dict[str, Any] = {}
+    with contextlib.suppress(OSError, ValueError):
+        says = json.loads(paths.lock.read_text(encoding="utf-8"))
+    if not says or not _is_locked(paths.lock):
+        return ""
+    return f"{says['work']}, process {says['process']}"
+
+
+def _is_locked(path: Path) -> bool:
+    try:
+        handle = os.open(path, os.O_RDWR)
+    except FileNotFoundError:
+        return False
+    except PermissionError:  # another user's
+        return True
+    try:
+        return not _lock(handle)
+    finally:
+        os.close(handle)
 
 
 def _open_locked(path: Path) -> int | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 from collections.abc import Iterable
@@ -26,7 +27,14 @@ __all__ = ["key_line", "read_study", "study_schema", "to_toml"]
 _EXAMPLES = {"cantilever": "beam-nylon", "layered": "layered", "dome": "breast-dome", "organ": "liver"}
 """Presets that show every key of a kind of body; the block shows those of the others."""
 
-_READABLE = {"m": (("m", 1.0), ("mm", 1e-3)), "Pa": (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))}
+_PRESETS = {"pad": "grasp", "tool": "fingertip"}
+"""Presets that show the keys of an interaction."""
+
+_READABLE = {
+    "m": (("m", 1.0), ("mm", 1e-3)),
+    "Pa": (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3)),
+    "rad": (("deg", math.pi / 180),),
+}
 """Units, from large to small, in which a quantity is written instead of its SI unit."""
 
 _WRITTEN_OUT = 1e9  # whole numbers below it are written without an exponent
@@ -129,8 +137,8 @@ def _example_of(content: dict[str, Any]) -> str:
     body, acting = content.get("body"), content.get("interaction")
     if isinstance(body, dict) and body.get("kind") == "part":
         return str(body.get("file", "PART.stl"))
-    if isinstance(acting, dict) and acting.get("kind") == "pad":
-        return "--preset grasp"
+    if isinstance(acting, dict) and (preset := _PRESETS.get(str(acting.get("kind")))):
+        return f"--preset {preset}"
     kind = body.get("kind", "cantilever") if isinstance(body, dict) else "cantilever"
     return f"--preset {_EXAMPLES.get(str(kind), 'block')}"
 

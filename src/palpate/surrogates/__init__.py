@@ -4,6 +4,7 @@
 
     surrogate            energy, fields and quantities as one value, with its file
     learnt_quantities    numbers of the inputs, with deviation and trained region
+    lumps                what hidden lumps add to the energy, and a body that has some
     model_card           what a file was made from, by whom, how good it is, where it ends
     energy               the energy that a hand feels: force, stiffness, trust
     baselines            what of the energy is known beforehand, one file for each kind of interaction
@@ -43,6 +44,7 @@ from palpate.surrogates.fields import (
     NodeField,
 )
 from palpate.surrogates.learnt_quantities import LearntQuantities
+from palpate.surrogates.lumps import Lump, LumpContrast, LumpRoom
 from palpate.surrogates.moving_rest import Followed
 from palpate.surrogates.surface import TouchedSurface
 from palpate.surrogates.surrogate import Surrogate
@@ -62,6 +64,9 @@ __all__ = [
     "Followed",
     "LearntEnergy",
     "LearntQuantities",
+    "Lump",
+    "LumpContrast",
+    "LumpRoom",
     "MeshPlaces",
     "ModalEvaluator",
     "ModalField",

@@ -177,6 +177,9 @@ def _of_body(body: Surrogate, meta: Mapping[str, Any]) -> dict[str, Any]:
         "unseen solves": meta.get("validation"),
         "solves left out in turn, relative force error": meta.get("left_out"),
         "corrected body, relative force error": correction.get("force_error"),
+        "lumps, contrast error of presses left out": {}
+        if body.lumps is None
+        else body.lumps.meta.get("contrast_error"),
     }
     warnings = [str(correction["warning"])] if correction.get("warning") else []
     validation = meta.get("validation")
@@ -286,6 +289,13 @@ def _limits_of(body: Any, meta: Mapping[str, Any]) -> list[str]:
         )
     if (part := pad_part_of(body.energy, meta)) is not None:
         limits.append(str(part))
+    if body.lumps is not None:
+        room = body.lumps.room
+        ends = " to ".join(millimetres(*corner) for corner in (room.lower, room.upper))
+        limits.append(
+            f"Lumps have soft edges and may have diameters of {2e3 * room.radius.low:.3g} to {2e3 * room.radius.high:.3g} "
+            f"mm, {room.ratio.low:.3g} to {room.ratio.high:.3g} times the modulus, centres within {ends}, and do not meet."
+        )
     known = "say" if body.energy.root is not None else "do not say"
     limits.append(f"The answers {known} how far the force may be off from place to place.")
     remembers = "Elastic: a force depends on the place alone, not on what came before."

@@ -11,7 +11,7 @@ from __future__ import annotations
 import html
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,9 @@ from palpate.surrogates.fields import (
     surface_fields,
 )
 from palpate.surrogates.learnt_quantities import LearntQuantities
+from palpate.surrogates.learnt_torque import ARM, torque_evaluator, torques
+from palpate.surrogates.lumps import Lump, LumpContrast
+from palpate.surrogates.lumps.lump_units import energy_with_lumps
 from palpate.surrogates.memories import Memory, Patches
 from palpate.surrogates.memories.friction import MINDLIN
 from palpate.surrogates.model_card import ModelCard, card_of
@@ -69,6 +72,8 @@ class Surrogate:
         there.
     quantities : mapping of name to LearntQuantities
         Numbers of the inputs, each group learnt together; may be empty.
+    lumps : LumpContrast, optional
+        What hidden lumps would add to the energy, for `with_lumps`.
 
     Raises
     ------
@@ -82,6 +87,7 @@ class Surrogate:
     memory: Memory | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
     quantities: Mapping[str, LearntQuantities] = field(default_factory=dict)
+    lumps: LumpContrast | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fields", dict(self.fields))
@@ -191,6 +197,31 @@ class Surrogate:
                 fix="Ask it for its numbers and fields: `palpate ask FILE --at …`, or surrogate.predict(X).",
             )
         return self.energy
+
+    @property
+    def torque_evaluator(self) -> Callable[..., None] | None:
+        """A new evaluator of the torque on the tool, one place at a time; None of a body that tells none.
+
+        Called with a place (3,), further inputs (p,) and the force (3,) there, it renews its ``torque`` (3,), N m.
+        """
+        return None if self.energy is None else torque_evaluator(self.energy, self.quantities.get(ARM))
+
+    def torque(self, X: np.ndarray) -> np.ndarray:
+        """Return the torque (N, 3) on the tool about its place at inputs X (N, n), N m, in the body's axes.
+
+        Raises
+        ------
+        UsageError
+            If the body tells none: a ball feels no torque about its centre.
+        """
+        evaluator = self.torque_evaluator
+        if evaluator is None:
+            raise UsageError(
+                f"{self.name!r} tells no torque.",
+                why="It was learnt from solves without one, such as those under a ball.",
+                fix="Sweep under a pp.SurfaceTool, and learn from 20 solves or more.",
+            )
+        return torques(self.hand_energy, evaluator, X)
 
     @property
     def _remembers(self) -> str:
@@ -334,6 +365,34 @@ class Surrogate:
         if memory is not None and spacing is not None:
             memory = memory.spread(self._patches(spacing), spacing)
         return replace(self, memory=memory)
+
+    def with_lumps(self, lumps: Iterable[Lump]) -> Surrogate:
+        """Return the body with hidden lumps: what a hand feels of it changes, what is drawn and remembered does not.
+
+        The energy of the lumps is added to that of the body, which holds while they are apart. The new body has
+        further units in its network and is evaluated, saved and exported as any other; its file holds the lumps as
+        numbers that whoever opens it can read.
+
+        Parameters
+        ----------
+        lumps : iterable of Lump
+            Balls in the room that ``self.lumps.room`` tells; none for the body without.
+
+        Raises
+        ------
+        UsageError
+            If the body was not learnt with lumps, or one leaves its room or the skin, or two meet.
+        """
+        chosen = tuple(lumps)
+        if self.lumps is None:
+            raise UsageError(
+                f"{self.name!r} knows nothing of lumps.",
+                why="It was learnt from presses whose strain energy was not looked up.",
+                fix="Sweep a `palpate.LumpProblem` and learn that.",
+            )
+        hidden = [[*lump.place, lump.radius, lump.ratio] for lump in chosen]
+        energy = energy_with_lumps(self.hand_energy, self.lumps, chosen)
+        return replace(self, energy=energy, lumps=None, meta={**self.meta, "lumps": hidden})
 
     def with_friction(
         self, kinetic: float, static: float | None = None, *, ratio: float = MINDLIN

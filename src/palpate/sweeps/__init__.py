@@ -9,6 +9,7 @@
     case.py        one case after the other, in a child process that may crash or hang
     runner.py      the chains on Dask, through the loss of workers
     cluster.py     worker processes on this machine; worker.py is the process
+    job_queue.py   workers as jobs of a cluster's queue
     ledger.py      finished parts of an interrupted sweep, on disk
     grow_sweep.py  a finished sweep that is asked for more samples
     solve_histories.py  histories of one load, for a body with memory; drives.py makes their loads
@@ -22,6 +23,7 @@
 
 from palpate.sweeps.cluster import LocalCluster, OnDemandCluster, Scheduler, local_cluster
 from palpate.sweeps.grow_sweep import grow, is_begun
+from palpate.sweeps.job_queue import JobQueue
 from palpate.sweeps.problem import (
     Answer,
     Chained,
@@ -45,6 +47,7 @@ __all__ = [
     "Designed",
     "ExternalProblem",
     "HistoryProblem",
+    "JobQueue",
     "LocalCluster",
     "OnDemandCluster",
     "Problem",

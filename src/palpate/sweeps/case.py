@@ -7,6 +7,7 @@ run in. What ends the child costs the case that did it: the others go on in a ne
 from __future__ import annotations
 
 import collections
+import os
 import pickle
 import threading
 import time
@@ -21,11 +22,13 @@ from palpate.dataset import BOOKKEEPING, Field
 from palpate.errors import UsageError
 from palpate.input_files import plain_text
 from palpate.supervised import Child, ChildEnded
+from palpate.sweeps.job_queue import JOB_END
 from palpate.sweeps.problem import Answer, Resettable, Solver
 
 __all__ = [
     "Columns",
     "Failure",
+    "NoTimeLeft",
     "Task",
     "empty",
     "failed_rows",
@@ -39,6 +42,7 @@ __all__ = [
 OPEN_LIMIT = 600.0
 """Time in s that opening a problem may take at least: it meshes, and imports what it needs."""
 _TRIES = 2  # tries of a case: the first may have ended for a reason of its own, such as want of memory
+_LEAST_LEFT = 10.0  # s that a job must have left for any chain
 _TRACE = 3000  # characters that a row keeps of the end of a traceback
 
 Columns: TypeAlias = dict[str, np.ndarray]
@@ -74,6 +78,7 @@ class Task:
     schema: tuple[Field, ...]  # fields to record, with the bookkeeping
     limit: float  # time in s that a case may take
     run: str  # a name of this sweep's run, which no other run has
+    expected: float = 0.0  # time in s that the chain may take, by what was seen; 0 where nothing is known
 
 
 @dataclass(frozen=True)
@@ -85,6 +90,24 @@ class Failure:
 
     def __str__(self) -> str:
         return f"{self.reason}\n\n{self.trace[-_TRACE:]}".rstrip()
+
+
+class NoTimeLeft(Exception):
+    """A worker whose job ends before a chain would."""
+
+    def __init__(self, worker: str, expected: float) -> None:
+        super().__init__(worker, expected)
+        self.worker = worker  # its address
+        self.expected = expected  # s that it should have left
+
+
+def _require_time(task: Task) -> None:
+    """Refuse a chain that would outlast the job that this process belongs to, if it belongs to one."""
+    end, expected = os.environ.get(JOB_END), max(task.expected, _LEAST_LEFT)
+    if end is not None and time.time() + expected > float(end):
+        from distributed import get_worker
+
+        raise NoTimeLeft(str(get_worker().address), expected)
 
 
 class _Local(threading.local):
@@ -116,6 +139,7 @@ def solve_chain(task: Task, points: np.ndarray) -> Columns:
     accident changes no bit of the answers; an exception is tried again with a new solver, and a case that takes
     longer than the limit not at all. After a case that failed for good the others go on with a new solver.
     """
+    _require_time(task)
     columns = empty(len(points), task.schema)
     child = prepare_child()
     failures: collections.Counter[int] = collections.Counter()

@@ -61,7 +61,7 @@ def grow(path: str | os.PathLike[str], problem: Any, arguments: Mapping[str, Any
     if not begins_alike:
         return None
     ledger = Ledger(path, plan.config)
-    ledger.begin()
+    ledger.begin(len(plan.points))
     ledger.add(finished)
     with system_errors(f"The folder {path} could not be removed, to make room for the larger sweep."):
         shutil.rmtree(path)

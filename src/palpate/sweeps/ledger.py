@@ -17,7 +17,7 @@ from palpate.dataset import Dataset
 from palpate.errors import FileFormatError, ResourceError, UsageError
 from palpate.files import restore_folder, system_errors, write_file
 
-__all__ = ["Ledger"]
+__all__ = ["Ledger", "Progress", "read_progress"]
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Ledger:
     @property
     def is_begun(self) -> bool:
         """True where an interrupted run of this very sweep has left its parts."""
-        return _config_in(self.parts / "plan.json") == self.config
+        return _plan_in(self.parts / "plan.json").get("config_hash") == self.config
 
     def complete(self) -> Dataset | None:
         """Read the finished dataset, if there is one."""
@@ -53,15 +53,15 @@ class Ledger:
         self._check(self.path, dataset.provenance.get("config_hash"))
         return dataset
 
-    def begin(self) -> None:
-        """Open the ledger; one that belongs to another sweep is refused."""
+    def begin(self, samples: int) -> None:
+        """Open the ledger of a sweep of so many samples; one that belongs to another sweep is refused."""
         plan = self.parts / "plan.json"
-        if (config := _config_in(plan)) is not None:
+        if (config := _plan_in(plan).get("config_hash")) is not None:
             self._check(self.parts, config)
             return
         with system_errors(f"The folder {self.parts} could not be made."):
             self.parts.mkdir(parents=True, exist_ok=True)
-        write_file(plan, json.dumps({"config_hash": self.config}))
+        write_file(plan, json.dumps({"config_hash": self.config, "samples": samples}))
 
     def read(self) -> Iterator[Dataset]:
         """Yield the parts that earlier runs finished."""
@@ -102,10 +102,47 @@ class Ledger:
             )
 
 
-def _config_in(plan: Path) -> object:
-    """Return the hash in a plan; None where there is no plan, or an earlier version was killed as it wrote it."""
+def _plan_in(plan: Path) -> dict[str, object]:
+    """Return what a plan says: nothing where there is none, or an earlier version was killed as it wrote it."""
     try:
         content = json.loads(plan.read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a sweep is, by its files."""
+
+    solved: int  # rows that are on disk, with those that failed
+    failed: int
+    samples: int | None  # rows of the whole sweep; None where an earlier version did not write it down
+    written: float | None  # time of the newest of them in s since 1970; None where there is none yet
+
+    @property
+    def is_complete(self) -> bool:
+        """True where the dataset is whole."""
+        return self.solved == self.samples
+
+
+def read_progress(path: Path) -> Progress | None:
+    """Return how far the sweep to a dataset's path is; None where it has not begun. Nothing is changed."""
+    if path.exists():
+        data = Dataset.open(path)
+        return Progress(len(data), len(data) - len(data.ok), len(data), path.stat().st_mtime)
+    folder = path.with_name(path.name + ".parts")
+    if not folder.exists():
         return None
-    return content.get("config_hash") if isinstance(content, dict) else None
+    converged: dict[int, bool] = {}
+    written = None
+    for part in folder.glob("part-*.zarr"):
+        try:
+            data = Dataset.open(part)
+            written = max(written or 0.0, part.stat().st_mtime)
+        except (FileFormatError, FileNotFoundError):  # it was being written, or tidied up
+            continue
+        converged.update(zip(data["sample"].tolist(), data.converged.tolist(), strict=True))
+    samples = _plan_in(folder / "plan.json").get("samples")
+    failed = sum(not value for value in converged.values())
+    return Progress(len(converged), failed, samples if isinstance(samples, int) else None, written)

@@ -6,16 +6,19 @@ the scheduler.
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import hashlib
 import logging
+import math
 import queue
 import signal
 import threading
+import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
@@ -23,41 +26,63 @@ import numpy as np
 
 from palpate.dataset import Field
 from palpate.errors import ResourceError
+from palpate.format import count, duration
 from palpate.processes import end_by_sigterm, note_interrupt
-from palpate.sweeps.case import Columns, Task, failed_rows, solve_chain
+from palpate.sweeps.case import Columns, NoTimeLeft, Task, failed_rows, solve_chain
 from palpate.sweeps.cluster import LocalCluster, OnDemandCluster, Scheduler, local_cluster
+from palpate.sweeps.job_queue import JobQueue
 from palpate.sweeps.problem import Problem
 
 if TYPE_CHECKING:
     import distributed
 
-__all__ = ["connect", "deferred_interrupt", "run"]
+__all__ = ["Machines", "connect", "deferred_interrupt", "longest", "run"]
 
 _PATIENCE = 0.5  # s between looks at the workers
 _FETCH = 5.0  # s; Dask's client may wait for ever for a result whose worker died just after it
 _TRIES = 3  # tries of a chain on workers that vanish
+_JOB_TRIES = 20  # the same where a queue ends workers for reasons of its own
+_AHEAD = 4  # chains that are handed in, for each that is solved at once: their problem takes memory
+_LEAST_AHEAD = 16
+_LOOK = 5.0  # s between looks at how many workers there are
+_SLACK = 1.5  # what a case may take, over the longest one that was seen
 _KEPT = "What is solved is kept where the sweep has a path: the same command goes on."
 
 
-@contextlib.contextmanager
-def connect(cluster: Any, workers: int | None) -> Iterator[tuple[distributed.Client, Callable[[], None]]]:
-    """Yield a client of `cluster`, and a function that starts dead workers again.
+@dataclass(frozen=True)
+class Machines:
+    """What a sweep runs on."""
 
-    A `LocalCluster` or an `OnDemandCluster`, a `Scheduler` or its address, or a cluster or client of Dask's is used and
-    left running; for ``None`` a cluster is started and ended.
+    client: distributed.Client
+    revive: Callable[[], None]  # starts dead workers again
+    tries: int = _TRIES  # of a chain whose worker vanishes
+    slots: int = 0  # cases that may be solved at once, where that is known beforehand
+    job_seconds: float = math.inf  # time that a worker has from its start to its end
+
+
+@contextlib.contextmanager
+def connect(cluster: Any, workers: int | None) -> Iterator[Machines]:
+    """Yield a client of `cluster`, with what the sweep must know of its workers.
+
+    A `LocalCluster`, an `OnDemandCluster` or a `JobQueue`, a `Scheduler` or its address, or a cluster or client of
+    Dask's is used and left running; for ``None`` a cluster is started and ended.
     """
     import distributed
 
+    known: dict[str, Any] = {}
     with contextlib.ExitStack() as stack:
         if cluster is None:
             cluster = stack.enter_context(local_cluster(workers))
+        elif isinstance(cluster, JobQueue):
+            known = {"tries": _JOB_TRIES, "slots": cluster.slots, "job_seconds": cluster.seconds or math.inf}
+            cluster = cluster.start()
         elif isinstance(cluster, OnDemandCluster):
             cluster = cluster.start()
         revive = cluster.revive if isinstance(cluster, LocalCluster) else _nothing
         if isinstance(cluster, distributed.Client):
-            yield cluster, revive
+            yield Machines(cluster, revive, **known)
         else:
-            yield stack.enter_context(_closing(_client(cluster))), revive
+            yield Machines(stack.enter_context(_closing(_client(cluster))), revive, **known)
 
 
 @contextlib.contextmanager
@@ -111,52 +136,102 @@ class _Chain:
 
 
 def run(
-    client: distributed.Client,
-    revive: Callable[[], None],
+    machines: Machines,
     problem: Problem,
     schema: Sequence[Field],
     points: np.ndarray,
     chains: Sequence[np.ndarray],
     accept: Callable[[np.ndarray, Columns], None],
     case_limit: float,
+    slowest: float = 0.0,
 ) -> None:
     """Solve the chains and hand over each one's rows and answers when it is whole.
 
     A case that fails becomes a row with the reason, and the sweep goes on. A chain whose worker vanishes is given to
-    another one; if that happens again and again, all its rows have failed.
+    another one; if that happens again and again, all its rows have failed. One that a worker has no time left for is
+    given to another too, and that worker ends.
 
     The inputs `points` (N, n) are solved by `chains` of their rows, a case within `case_limit` seconds, and `accept`
-    takes rows and their answers. The schema has the bookkeeping too; `revive` starts dead workers again.
+    takes rows and their answers. The schema has the bookkeeping too; `slowest` is the longest time of a case in s that
+    is known.
+
+    Raises
+    ------
+    ResourceError
+        If the scheduler is lost, or a chain takes longer than a job may.
     """
-    finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    client, finished = machines.client, queue.SimpleQueue[Any]()
+    waiting = collections.deque(_Chain(rows) for rows in chains)
     pending: dict[Any, _Chain] = {}
-    task = _task(problem, schema, case_limit)
+    task, ahead = _task(problem, schema, case_limit), _Ahead(machines)
+    refused = 0  # chains for which workers had no time left, one after the other
 
     def submit(chain: _Chain) -> None:
-        future = client.submit(solve_chain, task, points[chain.rows], pure=False)
+        own = replace(task, expected=_SLACK * slowest * chain.rows.size)
+        if own.expected > machines.job_seconds:
+            raise _too_short(own.expected, machines.job_seconds, chain.rows.size)
+        future = client.submit(solve_chain, own, points[chain.rows], pure=False)
         pending[future] = chain
         future.add_done_callback(finished.put)
 
     with deferred_interrupt() as check_interrupt:
-        for rows in chains:
-            submit(_Chain(rows))
-        while pending:
+        while pending or waiting:
+            while waiting and len(pending) < ahead():
+                submit(waiting.popleft())
             check_interrupt()
             _require_scheduler(client)
             try:
                 future = finished.get(timeout=_PATIENCE)
             except queue.Empty:
-                revive()
+                machines.revive()
                 continue
             _require_scheduler(client, future)
             chain = pending.pop(future)
             answers, error = _outcome(client, future)
             if answers is not None:
+                refused = 0
+                slowest = max(slowest, longest(answers))
                 accept(chain.rows, answers)
-            elif chain.tries < _TRIES and (error is None or _is_death(error)):
-                submit(_Chain(chain.rows, chain.tries + 1))
+            elif isinstance(error, NoTimeLeft):
+                refused += 1
+                if refused > machines.tries:
+                    raise _too_short(error.expected, machines.job_seconds, chain.rows.size)
+                client.retire_workers([error.worker], close_workers=True)
+                waiting.appendleft(chain)
+            elif chain.tries < machines.tries and (error is None or _is_death(error)):
+                waiting.appendleft(_Chain(chain.rows, chain.tries + 1))
             else:
                 accept(chain.rows, failed_rows(chain.rows.size, schema, _reason(error)))
+
+
+class _Ahead:
+    """How many chains are handed in at once: enough to keep all workers busy, which come and go."""
+
+    def __init__(self, machines: Machines) -> None:
+        self._machines, self._looked, self._most = machines, -math.inf, 0
+
+    def __call__(self) -> int:
+        """Return the number, from what the scheduler told some seconds ago at most."""
+        if (now := time.monotonic()) - self._looked > _LOOK:
+            threads = sum(self._machines.client.nthreads().values())
+            self._looked = now
+            self._most = max(_LEAST_AHEAD, _AHEAD * max(threads, self._machines.slots))
+        return self._most
+
+
+def longest(answers: Columns) -> float:
+    """Return the longest time of a solve in s among some rows; 0 where none is known."""
+    seconds = answers["solve_seconds"]
+    return float(np.max(seconds, initial=0.0, where=np.isfinite(seconds)))
+
+
+def _too_short(needed: float, given: float, cases: int) -> ResourceError:
+    return ResourceError(
+        "The jobs of the queue are too short for this sweep.",
+        why=f"{count(cases, 'case')} are solved one after the other, from each other's answers, and may take "
+        f"{duration(needed)}; a job has {duration(given)} from its start to its end.",
+        fix=f"Ask for a longer walltime. {_KEPT}",
+    )
 
 
 def _task(problem: Problem, schema: Sequence[Field], case_limit: float) -> Task:

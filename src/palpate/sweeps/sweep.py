@@ -19,12 +19,14 @@ from palpate.processes import CASE_LIMIT
 from palpate.sweeps.case import Columns, empty, put
 from palpate.sweeps.ledger import Ledger
 from palpate.sweeps.plan import Plan, make_plan
-from palpate.sweeps.runner import connect, run
+from palpate.sweeps.runner import connect, longest, run
 from palpate.sweeps.space import Design
 
 __all__ = ["Report", "reporter", "sweep"]
 
 _FLUSH_SECONDS = 3.0  # most work that a killed sweep loses; a store of many small files is slow to write
+_FLUSH_SHARE = 0.1  # of the time goes into writing at most, before that
+_FLUSH_GROWTH = 0.01  # s that each part adds to the time between two: all are read when the sweep goes on
 
 
 def sweep(
@@ -68,7 +70,8 @@ def sweep(
     workers : int, optional
         Processes on this machine, by default one for each core.
     cluster : optional
-        What to run on instead: a `local_cluster`, a `Scheduler` or its address, or a cluster or client of Dask's.
+        What to run on instead: a `local_cluster`, a `JobQueue`, a `Scheduler` or its address, or a cluster or
+        client of Dask's.
     progress : bool or callable
         A bar on standard error if that is a terminal; or a function (done, total).
     path : path, optional
@@ -124,8 +127,17 @@ def _solve(
 
         unsolved = [rows for rows in chains if not done[rows].all()]
         if unsolved:
-            with connect(cluster, workers) as (client, revive):
-                run(client, revive, plan.problem, plan.schema, plan.points, unsolved, accept, case_limit)
+            with connect(cluster, workers) as machines:
+                run(
+                    machines,
+                    plan.problem,
+                    plan.schema,
+                    plan.points,
+                    unsolved,
+                    accept,
+                    case_limit,
+                    longest(columns),
+                )
     data = plan.label(columns, np.arange(len(plan.points)))
     return ledger.finish(data) if ledger else data
 
@@ -134,19 +146,22 @@ def _solve(
 def _saving(plan: Plan, ledger: Ledger | None, columns: Columns) -> Iterator[Callable[[np.ndarray], None]]:
     """Yield a function that takes finished rows; after an interruption all of them are in the ledger."""
     fresh: list[np.ndarray] = []
-    begun = monotonic()
+    begun, interval, parts = monotonic(), 0.0, 0
 
     def flush() -> None:
-        nonlocal begun
+        nonlocal begun, interval, parts
+        started = monotonic()
         if ledger and fresh:
             rows = np.concatenate(fresh)
             ledger.add(plan.label({name: values[rows] for name, values in columns.items()}, rows))
+            parts += 1
         fresh.clear()
         begun = monotonic()
+        interval = min(_FLUSH_SECONDS, max((begun - started) / _FLUSH_SHARE, _FLUSH_GROWTH * parts))
 
     def save_rows(rows: np.ndarray) -> None:
         fresh.append(rows)
-        if monotonic() - begun > _FLUSH_SECONDS:
+        if monotonic() - begun > interval:
             flush()
 
     try:
@@ -166,7 +181,7 @@ def _read_finished(
     """
     done = np.zeros(len(plan.points), dtype=bool)
     if ledger:
-        ledger.begin()
+        ledger.begin(len(plan.points))
         for part in ledger.read():
             if not np.array_equal(part.rest, plan.layout.rest):
                 continue  # of another mesh: a mesher of another version made it

@@ -4,13 +4,15 @@
     round_tools   Sphere, Capsule, Fingertip, Cone
     edged_tools   Punch, Cylinder, Box
     scanned_tool  ScannedTool, of the file of a surface: `palpate.read_tool` makes it
-    posed_tool    a tool in an orientation, and how it is written to files
+    rotations     rotation vectors, their matrices and how turns follow from their changes
+    posed_tool    a tool in an orientation, its pose by its inputs, and how it is written to files
 
 A tool's own frame has its origin in the tool's centre. The tool points along −z: its foremost point is (0, 0, −front).
 """
 
 from palpate.tools.edged_tools import Box, Cylinder, Punch
-from palpate.tools.posed_tool import PosedTool
+from palpate.tools.posed_tool import PosedTool, Turns
+from palpate.tools.rotations import left_jacobian, rotation_matrix
 from palpate.tools.round_tools import Capsule, Cone, Fingertip, Sphere
 from palpate.tools.scanned_tool import ScannedTool
 from palpate.tools.tool_shape import Tool
@@ -26,4 +28,7 @@ __all__ = [
     "ScannedTool",
     "Sphere",
     "Tool",
+    "Turns",
+    "left_jacobian",
+    "rotation_matrix",
 ]

@@ -15,6 +15,10 @@ import numpy as np
 __all__ = ["Tool", "absolute", "larger", "length", "norm", "parts", "positive", "where_positive"]
 
 TINY = 1e-9  # m; keeps lengths differentiable at zero
+SAMPLES, SAME = (
+    64,
+    1e-6,
+)  # points at which a shape and its image are compared, and their difference over the front
 STEP = 1e-5  # of the difference quotient of a distance, over the tool's centre to its foremost point
 
 
@@ -111,6 +115,13 @@ class Tool:
         steps = STEP * self.front * np.eye(3)
         changes = [self.distance(points + step) - self.distance(points - step) for step in steps]
         return np.asarray(np.stack(changes, axis=-1) / (2 * STEP * self.front))
+
+    def keeps(self, matrix: np.ndarray) -> bool:
+        """Return whether an isometry (3, 3) that leaves the axis z leaves the shape as it is: by its distance."""
+        points = self.front * np.random.default_rng(0).normal(size=(SAMPLES, 3))
+        return bool(
+            np.allclose(self.distance(points), self.distance(points @ matrix.T), atol=SAME * self.front)
+        )
 
     def describe(self) -> dict[str, Any]:
         """Return the shape as plain data for a JSON file, with its ``"type"``."""

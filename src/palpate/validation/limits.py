@@ -67,6 +67,8 @@ class Limits:
         Largest second difference of the force along strokes over that of a reference.
     interval_coverage : (float, float)
         Smallest and largest share of the errors that the 90 % interval holds.
+    contrast_p95 : float
+        Error of the change of force by a hidden lump over that change, where it is above 1 % of the force.
     mesh_force : float
         The mesh's part in the force error ‖ΔF‖/‖F‖, from the same touches on elements half as large.
     refined_force_median, refined_force_p95 : float
@@ -102,6 +104,7 @@ class Limits:
     border_loop_work: float | None = 0.01
     smoothness: float | None = 3.0
     interval_coverage: tuple[float, float] | None = (0.80, 0.97)
+    contrast_p95: float | None = 0.25
     mesh_force: float | None = 0.07
     refined_force_median: float | None = 0.035
     refined_force_p95: float | None = 0.07
@@ -306,6 +309,14 @@ CRITERIA = (
         _COVER,
         "The model is surer of itself than it may be, or less: learn again, or calibrate its deviation by solves "
         "that were left out.",
+    ),
+    Criterion(
+        "contrast_p95",
+        "Change of force by a lump, error over the change, 95th percentile",
+        "share",
+        0.12,
+        "palpate's own: of a lump that changes the force by a just noticeable 7 % it is a quarter of that difference",
+        "What lumps add is missed: sweep more presses, with more lookups in each.",
     ),
     Criterion("mesh_force", "Force error, the mesh's part", "share", 0.01, _FORCE, _FINER),
     Criterion(

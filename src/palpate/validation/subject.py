@@ -19,7 +19,15 @@ from palpate.learning import History
 from palpate.learning.bent_body import hand_coordinates
 from palpate.learning.learn_dataset import LearningHistory, filter_record
 from palpate.network import TrainedRegion
-from palpate.surrogates import Field, FieldSurrogate, LearntEnergy, LearntQuantities, NodeField, Surrogate
+from palpate.surrogates import (
+    Field,
+    FieldSurrogate,
+    LearntEnergy,
+    LearntQuantities,
+    LumpContrast,
+    NodeField,
+    Surrogate,
+)
 from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
@@ -45,9 +53,11 @@ class Subject:
     solves: TouchSolves | None = None
     data: Dataset | None = None  # unseen rows, with displacements
     field: FieldSurrogate | None = None  # the displacement that is shown
+    lumps: LumpContrast | None = None  # what hidden lumps add
     loads: Surrogate | None = None  # networks that answer by load
     body: Surrogate | None = None  # a body with memory
     histories: Dataset | None = None  # unseen, of that body
+    tool: Surrogate | None = None  # a body under a tool, of which it tells the torque
     answering: Surrogate | None = None  # a surrogate that no hand feels, judged by its numbers and fields
     history: History | None = None  # record of the sequential filter
     refined: TouchSolves | None = None  # on a refined mesh
@@ -179,6 +189,8 @@ def _by_place(
         solves=solves,
         data=solves.data,
         field=field,
+        lumps=None if surrogate is None else surrogate.lumps,
+        tool=None if surrogate is None or surrogate.torque_evaluator is None else surrogate,
         refined=None if refined is None else _solves(refined, function, energy),
         strokes=strokes,
         seed=seed,

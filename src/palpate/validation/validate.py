@@ -55,7 +55,8 @@ class Validation:
     notes : tuple of str
         What was not judged, and why.
     figures : mapping of name to Figure
-        ``force``, ``energy``, ``stiffness``, ``smoothness``, ``coverage``, ``loops``, ``border_loops``, ``shape``,
+        ``force``, ``energy``, ``torque``, ``stiffness``, ``smoothness``, ``coverage``, ``contrast``, ``loops``,
+        ``border_loops``, ``shape``,
         ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``, ``answers``: see `palpate.validation.figures`.
     """
 
@@ -153,9 +154,14 @@ class Validation:
             found["unseen histories"] = self.histories.count
         found["force error, median"] = force.median
         found["force error, 95th percentile"] = force.p95
+        if self.torque is not None:
+            found["torque error over force times the tool's size, 95th percentile"] = self.torque.p95
         if self.whole_force_error is not None:
             found["force error with the mesh's"] = self.whole_force_error
             found["force error, the mesh's part"] = self.mesh_part
+        if self.contrast is not None:
+            found["contrast error of lumps, median"] = self.contrast.median
+            found["contrast error of lumps, 95th percentile"] = self.contrast.p95
         found["limits kept"] = self.passed
         return {**found, "caution": self.caution} if self.caution else found
 

@@ -45,6 +45,7 @@ from palpate.viewer.wire import Binary, Json, Wire
 __all__ = [
     "PROTOCOL",
     "Credit",
+    "DrawnTool",
     "Feel",
     "FieldInfo",
     "Frame",
@@ -67,7 +68,7 @@ __all__ = [
     "Vec3",
 ]
 
-PROTOCOL = 8  # a page of another protocol reloads itself
+PROTOCOL = 9  # a page of another protocol reloads itself
 
 Vec3 = tuple[float, float, float]
 
@@ -99,7 +100,11 @@ class Frame(Binary):
     time: Annotated[float, Wire("f64", "s, when the frame was composed, on the loop's clock")]
     echo: Annotated[float, Wire("f64", "ms, page clock: `sent` of the last Hand that this page sent")]
     position: Annotated[
-        Vec3, Wire("vec3", "m, the probe's centre, or the hand's offset from what it holds at rest")
+        Vec3,
+        Wire(
+            "vec3",
+            "m, the probe's centre or the tool's place, or the hand's offset from what it holds at rest",
+        ),
     ]
     force: Annotated[Vec3, Wire("vec3", "N, on the hand")]
     rate: Annotated[float, Wire("f32", "Hz, ticks per second achieved")]
@@ -272,6 +277,19 @@ class Line:
 
 
 @dataclass(frozen=True)
+class DrawnTool:
+    """The tool that presses a body: its closed surface around its place, in the body's axes."""
+
+    words: str  # shape and sizes, such as ``capsule of radius 6 mm, 24 mm long``
+    centre: Vec3  # (3,) way from the tool's place to its middle, m
+    points: tuple[float, ...]  # x y z of each point from the place, m
+    normals: tuple[float, ...]  # outward unit normal of each
+    triangles: tuple[int, ...]  # three points each
+    # parameters of `Hello` that are the rotation vector by which it is turned about its place, x y z, rad; -1 for none
+    turns: tuple[int, int, int]
+
+
+@dataclass(frozen=True)
 class Hello(Json):
     """A touchable body and its loop, once per connection, server to page."""
 
@@ -284,6 +302,7 @@ class Hello(Json):
     holds: bool  # whether the hand holds a node or a patch, and doesn't press a free probe
     radius: float  # of the probe, or of what is held, for drawing, m
     radius_parameter: int  # the parameter that is the probe's radius; -1 where none is
+    tool: DrawnTool | None  # what presses where it is no ball; the probe's centre is then the tool's place
     deepest: float  # deepest trained depth, or largest trained displacement of what is held, m
     force_max: float  # largest force of the trained region, N
     stiffness_max: float  # largest stiffness of the trained region, N/m
@@ -319,6 +338,7 @@ class Shown(Json):
     fields: tuple[FieldInfo, ...]  # quantities to colour by; the first is the displacement
     steps: tuple[StepInfo, ...]  # its states, in order
     reach: float  # largest displacement of all states, m
+    tool: DrawnTool | None = None  # what presses where it is no ball; a state's centre is then its place
 
 
 @dataclass(frozen=True)

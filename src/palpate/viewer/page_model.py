@@ -20,10 +20,10 @@ from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import NodeField
-from palpate.surrogates.baselines import require_ball
 from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.units import Range, bounds
 from palpate.viewer.about_record import about_record
+from palpate.viewer.drawn_tool import drawn_tool
 from palpate.viewer.indentation_drawing import yielding_in_words
 from palpate.viewer.messages import PROTOCOL, Frame, Hello, Line, Modes, RangeInfo, Surface, Vec3
 from palpate.viewer.part_messages import TrustMap
@@ -72,7 +72,6 @@ class PageModel:
     """
 
     def __init__(self, body: Touchable, version: int = 1, centre: np.ndarray | None = None) -> None:
-        require_ball(body.energy.baseline, "be drawn on a page")
         self.body, self.version = body, version
         self.centre = body.home if centre is None else centre
         self._line = None if body.line is None else LineDrawing(body, body.line)
@@ -125,6 +124,7 @@ class PageModel:
             holds=body.holds,
             radius=body.radius,
             radius_parameter=-1 if body.radius_parameter is None else body.radius_parameter,
+            tool=None if body.tool is None else drawn_tool(body.tool, body.parameters),
             deepest=body.deepest,
             force_max=body.force_max,
             stiffness_max=body.stiffness_max,

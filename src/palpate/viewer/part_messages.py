@@ -18,13 +18,13 @@ The conversation, over a websocket of its own at ``/part``:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Annotated, ClassVar
 
 import numpy as np
 
-from palpate.viewer.messages import Vec3
+from palpate.viewer.messages import DrawnTool, Vec3
 from palpate.viewer.wire import Binary, Json, Wire
 
 __all__ = [
@@ -39,7 +39,9 @@ __all__ = [
     "Picks",
     "Ready",
     "Role",
+    "SizeInfo",
     "StartWish",
+    "ToolInfo",
     "TrustMap",
     "UnitWish",
     "WrapWish",
@@ -129,6 +131,24 @@ class MaterialInfo:
 
 
 @dataclass(frozen=True)
+class SizeInfo:
+    """A size of a tool that can be chosen: its name in `StartWish`, what it is, and a text with its unit."""
+
+    name: str
+    words: str
+    value: str
+
+
+@dataclass(frozen=True)
+class ToolInfo:
+    """Something that can press a part: a ball, or a tool with sizes that suit the part."""
+
+    name: str  # ``ball`` or the tool's shape
+    about: str  # in a few words
+    sizes: tuple[SizeInfo, ...]  # none of a ball, whose radius is a choice of its own
+
+
+@dataclass(frozen=True)
 class PartNews(Json):
     """The stage of the work on a part, server to page."""
 
@@ -154,6 +174,7 @@ class PartFacts(Json):
     whole: bool  # whether faces can be picked as a whole only
     materials: tuple[MaterialInfo, ...]  # that can be asked for by name
     laws: tuple[str, ...]  # that take Young's modulus and Poisson's ratio
+    tools: tuple[ToolInfo, ...]  # that can press it
     choices: Mapping[str, str]  # made so far, as texts with units, by the names of `StartWish`
     notes: tuple[str, ...]  # what else there is to say, in sentences
 
@@ -167,8 +188,10 @@ class StartWish(Json):
     young: str  # Young's modulus of an own material
     poisson: str  # Poisson's ratio of an own material
     radius: str  # of the ball
-    depth: str  # how deep the ball presses at most
+    depth: str  # how deep the ball or tool presses at most
     trial: bool = False  # whether the choices are judged only, and nothing begins
+    tool: str = "ball"  # what presses, by the name of a `ToolInfo`
+    sizes: Mapping[str, str] = field(default_factory=dict)  # of a tool that is no ball, by their names
 
 
 @dataclass(frozen=True)
@@ -190,9 +213,10 @@ class Answer(Json):
     """The answer to a wish, server to page: problems in sentences, or none where all fits."""
 
     problem: str  # of the whole; empty where there is none
-    # problems of single choices, by the names of `StartWish`; null: none of them was judged
+    # problems of single choices, by the names of `StartWish`; of sizes by ``size-`` and theirs; null: none of them was judged
     fields: Mapping[str, str] | None = None
     trial: bool = False  # whether the wish was one on trial
+    tool: DrawnTool | None = None  # the tool that was wished for, to be drawn
 
 
 @dataclass(frozen=True)

@@ -37,9 +37,11 @@ from palpate.errors import PalpateError, UsageError
 from palpate.format import millimetres
 from palpate.runtime import LoopProcess
 from palpate.runtime.touchable import load_touchable
+from palpate.tools.tool_sizes import BALL
 from palpate.units import parse_quantity
 from palpate.viewer.compression import BinaryAnswers
-from palpate.viewer.messages import PROTOCOL
+from palpate.viewer.drawn_tool import drawn_tool
+from palpate.viewer.messages import PROTOCOL, DrawnTool
 from palpate.viewer.page_model import PageModel
 from palpate.viewer.part_messages import (
     Answer,
@@ -54,7 +56,7 @@ from palpate.viewer.part_messages import (
 )
 from palpate.viewer.server import body_routes
 from palpate.viewer.session import Session
-from palpate.viewer.shown_part import PartChoices, ShownPart, choices_of
+from palpate.viewer.shown_part import PartChoices, ShownPart, choices_of, error_line, wished_tool
 from palpate.viewer.solve_dots import on_surface
 from palpate.viewer.traffic import Bucket, tell_all
 from palpate.viewer.web_server import LocalServer, ServerOptions, local_application, skeleton
@@ -383,8 +385,8 @@ class PartPage(LocalServer):
                 elif not (misfits or trial):
                     self._start_by(self._part, visitor, wish)
             except PalpateError as error:
-                return Answer(" ".join(filter(None, (error.what, error.why, error.fix))), misfits)
-            return Answer("", misfits, trial)
+                return Answer(error_line(error), misfits)
+            return Answer("", misfits, trial, None if misfits else _drawn_tool(wish))
 
     def _wrap_by(self, wish: WrapWish) -> Answer:
         """Let a refused part be wrapped, and show it; return why it can't be."""
@@ -394,7 +396,7 @@ class PartPage(LocalServer):
             try:
                 part = self._on_wrap(parse_quantity(wish.size, "m", "The size of the wrap", bare=False))
             except PalpateError as error:
-                return Answer(" ".join(filter(None, (error.what, error.why, error.fix))))
+                return Answer(error_line(error))
             self.show_part(part)
             self._turn("choosing", " ".join(part.notes))  # which tell how far the surface moved
             return Answer("")
@@ -461,6 +463,11 @@ class PartPage(LocalServer):
             work.close()
             return
         asyncio.run_coroutine_threadsafe(work, events)
+
+
+def _drawn_tool(wish: StartWish | UnitWish) -> DrawnTool | None:
+    """Return the tool that a page wishes for, to be drawn; None for a ball."""
+    return None if isinstance(wish, UnitWish) or wish.tool == BALL else drawn_tool(wished_tool(wish))
 
 
 def serve_part(

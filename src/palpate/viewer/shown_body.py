@@ -16,6 +16,8 @@ import numpy as np
 
 from palpate.dataset.readers.vtk_files import Grid, read_series, read_vtu
 from palpate.errors import FileFormatError, UsageError
+from palpate.tools import PosedTool
+from palpate.viewer.drawn_tool import drawn_tool
 from palpate.viewer.messages import PROTOCOL, FieldInfo, Shown, Step, StepInfo, Surface
 from palpate.viewer.surfaces import Split, split
 
@@ -47,6 +49,7 @@ class ShownBody:
     steps: Sequence[ShownStep]  # at least one
     units: Mapping[str, str] = field(default_factory=dict)  # of the steps' values
     fixed: np.ndarray | None = None  # (t,) bool, triangles that don't move
+    tool: PosedTool | None = None  # what presses where it is no ball; `ball` holds its place
 
     def __post_init__(self) -> None:
         rest, triangles = np.asarray(self.rest), np.asarray(self.triangles)
@@ -84,7 +87,8 @@ class ShownBody:
             high = high if high > low else low + 1.0
             fields.append(FieldInfo(name, self.units.get(name, ""), low, high, 1, 0))
         steps = tuple(StepInfo(s.label or f"{i + 1}", dict(s.figures)) for i, s in enumerate(self.steps))
-        return Shown(PROTOCOL, self.name, tuple(fields), steps, reach)
+        tool = None if self.tool is None else drawn_tool(self.tool)
+        return Shown(PROTOCOL, self.name, tuple(fields), steps, reach, tool)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -217,10 +221,12 @@ def body_of_dataset(dataset: Any, name: str) -> ShownBody:
     if len(rows) > MOST_STEPS:
         rows = rows[np.linspace(0, len(rows) - 1, MOST_STEPS).astype(int)]
     origin = dataset.provenance
-    radius = _radius(origin)
+    radius, tool = _radius(origin), _tool(origin)
     rest = np.asarray(data["rest"].values, dtype=float)
     steps = [_sample(data, int(row), radius) for row in rows]
-    return ShownBody(name, rest, np.asarray(data["triangles"].values), steps, fixed=_fixed(data, origin))
+    return ShownBody(
+        name, rest, np.asarray(data["triangles"].values), steps, fixed=_fixed(data, origin), tool=tool
+    )
 
 
 def _sample(data: Any, row: int, radius: float | None) -> ShownStep:
@@ -247,11 +253,22 @@ def _fixed(data: Any, origin: Any) -> np.ndarray | None:
     return np.isin(data["surface_of"].values, numbers)
 
 
+def _tool(origin: Any) -> PosedTool | None:
+    """Return the tool of which a record of how a dataset was made tells."""
+    acting = origin.get("problem", {}).get("interactions", ())
+    tools = [
+        PosedTool.of(one) for one in acting if isinstance(one, dict) and one.get("type") == "SurfaceTool"
+    ]
+    return tools[0] if len(tools) == 1 else None
+
+
 def _radius(record: Any) -> float | None:
-    """The radius of a sphere probe somewhere in a record of how a dataset was made."""
+    """The radius of a sphere probe, or about that of a tool, in a record of how a dataset was made."""
     if isinstance(record, dict):
         if record.get("type") == "SphereProbe":
             return float(record["radius"])
+        if record.get("type") == "SurfaceTool":
+            return PosedTool.of(record).shape.size
         record = list(record.values())
     if isinstance(record, list | tuple):
         return next((r for r in map(_radius, record) if r is not None), None)

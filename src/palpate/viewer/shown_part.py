@@ -6,6 +6,7 @@ PartChoices  what a person has chosen
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,13 +14,43 @@ from functools import cached_property
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.format import millimetres
+from palpate.format import bound, millimetres, share
+from palpate.tools import PosedTool
+from palpate.tools.tool_sizes import (
+    BALL,
+    TURNS,
+    USUAL,
+    about,
+    size_unit,
+    sizes_of,
+    suitable_tool,
+    tool_by_name,
+)
 from palpate.units import parse_quantity
 from palpate.viewer.messages import Surface
-from palpate.viewer.part_messages import FaceInfo, MaterialInfo, PartFaces, PartFacts, Role, StartWish
+from palpate.viewer.part_messages import (
+    FaceInfo,
+    MaterialInfo,
+    PartFaces,
+    PartFacts,
+    Role,
+    SizeInfo,
+    StartWish,
+    ToolInfo,
+)
 from palpate.viewer.surfaces import split
 
-__all__ = ["PartChoices", "ShownMaterial", "ShownPart", "as_wish", "choices_of", "require_room"]
+__all__ = [
+    "PartChoices",
+    "ShownMaterial",
+    "ShownPart",
+    "as_wish",
+    "choices_of",
+    "error_line",
+    "require_room",
+    "require_room_for_tool",
+    "wished_tool",
+]
 
 _QUANTITIES = {
     "young": ("Young's modulus", "Pa"),
@@ -38,10 +69,12 @@ class PartChoices:
     law: str  # of an own material
     young: float  # Pa
     poisson: float
-    radius: float  # of the ball, m
-    depth: float  # largest depth of the ball, m
+    radius: float  # of the ball, m; of another tool that of the ball which its usual sizes go with
+    depth: float  # largest depth of the ball or tool, m
     held: np.ndarray | None = None  # (k,) int, triangles; None: as chosen at first
     touched: np.ndarray | None = None  # (k,) int, triangles; None: as chosen at first
+    tool: str = BALL  # what presses, by name
+    posed: PosedTool | None = None  # the tool; None for a ball
 
 
 @dataclass(frozen=True)
@@ -97,14 +130,16 @@ class ShownPart:
         """Return what is wrong with numbers of a wish, in sentences by the names of `StartWish`."""
         problems: dict[str, str] = {}
         for name in _QUANTITIES:
-            if wish.material and name in {"young", "poisson"}:
-                continue  # those of the material are taken
+            if (wish.material and name in {"young", "poisson"}) or (wish.tool != BALL and name == "radius"):
+                continue  # those of the material are taken, and those of the tool
             try:
                 number = _quantity(name, getattr(wish, name))
                 if name in {"radius", "depth"}:
                     require_room(name, number, self.size)
             except UsageError as error:
-                problems[name] = " ".join(filter(None, (error.what, error.why, error.fix)))
+                problems[name] = error_line(error)
+        if wish.tool != BALL:
+            problems |= _size_problems(wish, self.size)
         return problems
 
     def facts(self) -> PartFacts:
@@ -131,9 +166,10 @@ class ShownPart:
                 for name, m in self.materials.items()
             ),
             laws=self.laws,
+            tools=_tools(self.choices),
             choices={
                 name: getattr(wish, name)
-                for name in ("material", "law", "young", "poisson", "radius", "depth")
+                for name in ("material", "law", "young", "poisson", "radius", "depth", "tool")
             },
             notes=self.notes,
         )
@@ -148,6 +184,8 @@ def as_wish(choices: PartChoices) -> StartWish:
         poisson=f"{choices.poisson:.6g}",
         radius=f"{choices.radius * 1e3:.6g} mm",
         depth=f"{choices.depth * 1e3:.6g} mm",
+        tool=choices.tool,
+        sizes={} if choices.posed is None else _size_texts(choices.posed),
     )
 
 
@@ -159,11 +197,112 @@ def choices_of(wish: StartWish, held: np.ndarray | None, touched: np.ndarray | N
         law=wish.law,
         young=_quantity("young", wish.young) if own else 0.0,
         poisson=_quantity("poisson", wish.poisson) if own else 0.0,
-        radius=_quantity("radius", wish.radius),
+        radius=_quantity("radius", wish.radius) if wish.tool == BALL else 0.0,
         depth=_quantity("depth", wish.depth),
         held=held,
         touched=touched,
+        tool=wish.tool,
+        posed=None if wish.tool == BALL else wished_tool(wish),
     )
+
+
+def wished_tool(wish: StartWish) -> PosedTool:
+    """Return the tool of a wish; a size that is none is refused."""
+    sizes = {key: parse_quantity(text, size_unit(key), _title(key)) for key, text in wish.sizes.items()}
+    return tool_by_name(wish.tool, sizes)
+
+
+def _size_problems(wish: StartWish, room: np.ndarray) -> dict[str, str]:
+    """Return what is wrong with the sizes of a tool on a part of a size (3,) in m, in sentences by ``size-`` and their names."""
+    problems: dict[str, str] = {}
+    for key, text in wish.sizes.items():
+        try:
+            parse_quantity(text, size_unit(key), _title(key))
+        except UsageError as error:
+            problems[f"size-{key}"] = error_line(error)
+    if problems:
+        return problems
+    first, last = next(iter(wish.sizes)), [key for key in wish.sizes if key not in TURNS][-1]
+    try:
+        tool = wished_tool(wish)
+    except UsageError as error:  # of sizes that do not go together the last is the one that ends the shape
+        return {f"size-{last}": error_line(error)}
+    try:
+        require_room_for_tool(tool, room)
+    except UsageError as error:
+        return {f"size-{first}": error_line(error)}
+    try:
+        require_round_edge(tool)
+    except UsageError as error:
+        return {f"size-{last}": error_line(error)}
+    return {}
+
+
+def require_room_for_tool(tool: PosedTool, size: np.ndarray) -> None:
+    """Refuse a tool that is wider than a part of a size (3,) in m is long."""
+    axes = np.vstack([np.eye(3), -np.eye(3)])
+    turned = axes if tool.turn is None else axes @ tool.turn
+    reach = tool.shape.support(turned).reshape(2, 3).sum(axis=0)
+    wide, longest = float(reach[np.isfinite(reach)].max(initial=2 * tool.shape.size)), float(size.max())
+    if wide > longest:
+        raise UsageError(
+            f"The {tool.shape} is {millimetres(wide)} across, and the part {millimetres(longest)} long.",
+            fix=f"Choose sizes of at most {share(longest / wide)} of these.",
+        )
+
+
+def require_round_edge(tool: PosedTool) -> None:
+    """Refuse an edge that is sharper than the elements under a tool become by themselves."""
+    from palpate.physics.interactions.surface_tool import (
+        EDGE_ELEMENT,
+        FINEST,
+    )  # a page of a body needs no physics
+
+    edge, finest = tool.shape.least_radius, FINEST * tool.shape.size
+    if finest > EDGE_ELEMENT * edge:
+        raise UsageError(
+            f"The edge of the {tool.shape} is too sharp for elements of {millimetres(finest)}.",
+            fix=f"Choose one with a radius of at least {millimetres(bound(finest / EDGE_ELEMENT, least=True))}.",
+        )
+
+
+def _tools(choices: PartChoices) -> tuple[ToolInfo, ...]:
+    """Return what can press a part, with sizes that suit it, or those that were chosen."""
+    tools = [ToolInfo(BALL, "", ())]
+    for name in USUAL:
+        own = choices.posed if name == choices.tool else None
+        texts = _size_texts(own or suitable_tool(name, choices.radius))
+        sizes = tuple(
+            SizeInfo(key, _title(key).removeprefix("The ").lower(), text) for key, text in texts.items()
+        )
+        tools.append(ToolInfo(name, about(name), sizes))
+    return tuple(tools)
+
+
+def _size_texts(tool: PosedTool) -> dict[str, str]:
+    """Return the sizes of a tool as texts with their units."""
+    return {
+        key: f"{math.degrees(value):.6g}°" if size_unit(key) == "rad" else f"{1e3 * value:.6g} mm"
+        for key, value in sizes_of(tool).items()
+    }
+
+
+def _title(key: str) -> str:
+    """Return what a size is called, at the head of a sentence."""
+    if key in TURNS:
+        return f"The turn about {key[-1]}"
+    if key.startswith("size_"):
+        return f"The length along {key[-1]}"
+    return {
+        "edge": "The edge's radius",
+        "tip": "The tip's radius",
+        "half_angle": "The angle from axis to side",
+    }.get(key, f"The {key}")
+
+
+def error_line(error: UsageError) -> str:
+    """Return what, why and fix of an error in one line."""
+    return " ".join(filter(None, (error.what, error.why, error.fix)))
 
 
 def require_room(name: str, length: float, size: np.ndarray) -> None:

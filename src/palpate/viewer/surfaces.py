@@ -111,7 +111,7 @@ def touchable_triangles(body: Touchable, field: FieldSurrogate, *, detail: bool 
 def _beside(body: Touchable, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the distances (t,) of triangles (t, 3, 3) to the touched surface, m, and whether they look its way."""
     assert body.surface is not None
-    distance, slope, _ = body.surface.at(corners.mean(axis=1))
+    distance, slope, _ = body.surface.at(corners.mean(axis=1) - body.shift)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return distance, np.einsum("ti,ti->t", normal, slope) > 0.5 * np.linalg.norm(normal, axis=1)
 
@@ -134,6 +134,7 @@ def relief(body: Touchable) -> tuple[np.ndarray, np.ndarray]:
         points, arrived = flat, np.ones(len(flat), bool)
     else:
         points, arrived = _lowered(body, flat)
+        points = points + body.shift
     k = (np.arange(ALONG)[:, None] * (ALONG + 1) + np.arange(ALONG)).ravel()
     lower = np.stack([k, k + ALONG + 1, k + ALONG + 2], axis=1)
     upper = np.stack([k, k + ALONG + 2, k + 1], axis=1)

@@ -9,18 +9,18 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any
 
-from palpate.viewer import messages, part_messages
+from palpate.viewer import exam_messages, messages, part_messages
 from palpate.viewer.wire import CODES, Binary, Json, Wire
 
 __all__ = ["generate"]
 
 _DECLARED: list[type[Any]] = [
     kind
-    for module in (messages, part_messages)
+    for module in (messages, part_messages, exam_messages)
     for kind in vars(module).values()
     if isinstance(kind, type) and kind.__module__ == module.__name__
 ]
-"""Classes of both modules in their order; the protocols among them are no messages."""
+"""Classes of the modules in their order; the protocols among them are no messages."""
 BINARY: list[type[Binary]] = [kind for kind in _DECLARED if issubclass(kind, Binary)]
 JSON: list[type[Json]] = [kind for kind in _DECLARED if issubclass(kind, Json)]
 ENUMS: list[type[IntEnum]] = [kind for kind in _DECLARED if issubclass(kind, IntEnum)]
@@ -35,7 +35,7 @@ TYPES = dict.fromkeys(CODES, "number") | {
 }
 
 HEAD = """\
-// Generated from palpate/viewer/messages.py and part_messages.py; change it there, then
+// Generated from palpate/viewer/messages.py, part_messages.py and exam_messages.py; change it there, then
 //   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 
 import { decode, encode } from "./wire";
@@ -80,6 +80,8 @@ def _type(hint: Any) -> str:
         return f"{_type(arguments[0])} | null"
     if origin is tuple and arguments[-1] is Ellipsis:
         return f"{_type(arguments[0])}[]"
+    if origin is tuple:
+        return f"[{', '.join(map(_type, arguments))}]"
     if origin is Mapping:
         return "Record<string, unknown>"
     return str(hint.__name__)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import ngsolve
 import numpy as np
 import pytest
@@ -11,7 +13,6 @@ from palpate.physics.interactions import SphereProbe
 from palpate.physics.interactions.tool_contact import Contact
 from palpate.physics.shapes.surface_checks import winding_number
 from palpate.physics.stop import Stop
-from palpate.tools import Sphere
 
 
 def test_a_corner_turned_over_between_the_quadrature_points_is_seen():
@@ -32,7 +33,7 @@ def field():
 
 def verdict(field, centre, displacement=(0, 0, 0), stop=None):
     field.show(field.interpolate(ngsolve.CF(displacement)))
-    return Contact(field, field.rest, "top", Sphere(RADIUS), stop).inspect(np.asarray(centre))
+    return Contact(field, field.rest, replace(PROBE, stop=stop)).inspect(np.asarray(centre))
 
 
 def test_a_sphere_at_rest_on_the_surface_is_admissible(field):

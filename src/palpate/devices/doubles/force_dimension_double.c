@@ -63,6 +63,8 @@ typedef struct {
   double time_guard, brake_speed, motor_force;
   /* buttons, as a mask */
   double buttons;
+  /* the wrist: 0 none, 1 passive, 2 with motors; its turn, a rotation vector (rad); and the torque on it (N m) */
+  double wrist, turn_x, turn_y, turn_z, torque_x, torque_y, torque_z;
   /* the hand: kg, N s/m, N/m, m, Hz; scripted: its place is that of the script whatever the force */
   double mass, damping, stiffness, amplitude, frequency, scripted, x, y, z;
   /* faults: commands until USB is lost; calls that fail or guard from now on; NaN as a position; garbage at first; what the
@@ -87,6 +89,7 @@ static State s;
 static struct { const char *name; double *value; } const settings[] = {
     ENTRY(type), ENTRY(serial), ENTRY(left_handed), ENTRY(present), ENTRY(in_use), ENTRY(homed), ENTRY(homing_fails), ENTRY(hand_homes),
     ENTRY(powered), ENTRY(device_max_force), ENTRY(plain), ENTRY(deaf), ENTRY(time_guard), ENTRY(brake_speed), ENTRY(motor_force), ENTRY(buttons),
+    ENTRY(wrist), ENTRY(turn_x), ENTRY(turn_y), ENTRY(turn_z), ENTRY(torque_x), ENTRY(torque_y), ENTRY(torque_z),
     ENTRY(mass), ENTRY(damping), ENTRY(stiffness), ENTRY(amplitude), ENTRY(frequency), ENTRY(scripted), ENTRY(x),
     ENTRY(y), ENTRY(z), ENTRY(lost_after), ENTRY(fail_position), ENTRY(fail_force), ENTRY(fail_error),
     ENTRY(fail_velocity), ENTRY(guard), ENTRY(nan), ENTRY(garbage), ENTRY(absent), ENTRY(broken), ENTRY(manual), ENTRY(time), ENTRY(force_x),
@@ -315,6 +318,29 @@ EXPORT int dhdGetPosition(double *x, double *y, double *z, char id) {
   return guarded;
 }
 
+EXPORT bool dhdHasWrist(char id) {
+  (void)id;
+  return !enter() && s.wrist > 0;
+}
+
+EXPORT bool dhdHasActiveWrist(char id) {
+  (void)id;
+  return !enter() && s.wrist > 1;
+}
+
+/* the rotation of a rotation vector by Rodrigues' formula, row by row */
+EXPORT int dhdGetPositionAndOrientationFrame(double *x, double *y, double *z, double *frame, char id) {
+  int code = dhdGetPosition(x, y, z, id);
+  double w[3] = {s.turn_x, s.turn_y, s.turn_z}, angle = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+  double a = angle > 0 ? sin(angle) / angle : 1, b = angle > 0 ? (1 - cos(angle)) / (angle * angle) : 0.5;
+  double cross[9] = {0, -w[2], w[1], w[2], 0, -w[0], -w[1], w[0], 0};
+  if (code < 0) return code;
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++)
+      frame[3 * i + j] = (i == j) * cos(angle) + a * cross[3 * i + j] + b * w[i] * w[j];
+  return code;
+}
+
 EXPORT int dhdConfigLinearVelocity(int window, int mode, char id) {
   (void)window, (void)mode, (void)id;
   return enter();
@@ -343,6 +369,14 @@ EXPORT int dhdSetForce(double x, double y, double z, char id) {
   s.saturations += saturated;
   commanded = now();
   return saturated ? 2 : 0;
+}
+
+EXPORT int dhdSetForceAndTorque(double x, double y, double z, double a, double b, double c, char id) {
+  int code = dhdSetForce(x, y, z, id);
+  if (code < 0) return code;
+  if (s.wrist < 2) return fail(NOT_AVAILABLE);
+  s.torque_x = a, s.torque_y = b, s.torque_z = c;
+  return code;
 }
 
 EXPORT int dhdEnableForce(bool on, char id) {

@@ -138,6 +138,11 @@ class HaplySimulator(ServiceDouble):
             for places in (grip["state"], grip["state"].get("buttons", {})):
                 places |= {name: down for name in names if name in places}
 
+    def turn(self, w: float, x: float, y: float, z: float) -> None:
+        """Turn all grips, by a quaternion in the service's axes."""
+        for grip in (grip for family in self.grips.values() for grip in family):
+            grip["state"]["orientation"] = {"w": w, "x": x, "y": y, "z": z}
+
     def send_event(self, name: str, message: str = "", level: str = "", **data: Any) -> None:
         """Send an event to who watches, such as ``device-safety-triggered`` with ``safety_type="ebrake_triggered"``."""
         category = name.partition("-")[0]

@@ -60,13 +60,14 @@ enum { CALIBRATION_OK = 0x5000 };
 static struct {
     double present, licence, manual, manual_after, speed, gives_limits, max_force, continuous, stiffness, clamps, offset_y;
     double calibration, calibration_style, calibrates, inkwell, safety_switch, buttons, model;
+    double input_dof, output_dof, turn_x, turn_y, turn_z, torque_x, torque_y, torque_z;
     double error, error_frames, off_frames, lost, garbage, fixed, x, y, z, counting,
         lost_after, warm_every;
     double frames, begins, illegal, outside, invalid, null_names, largest, force_x, force_y, force_z, enabled, open,
         scheduled, running, rate, exceeded, uneven;
 } s, fresh = {.present = 1, .licence = 1, .speed = 1, .gives_limits = 1, .max_force = 3.3, .continuous = 0.88,
               .stiffness = 1.26, .clamps = 1, .calibration = CALIBRATION_OK, .calibration_style = 4, .calibrates = 1,
-              .off_frames = 50, .rate = 1000, .model = MODEL, .lost_after = LOST_AFTER,
+              .off_frames = 50, .rate = 1000, .model = MODEL, .input_dof = 6, .output_dof = 3, .lost_after = LOST_AFTER,
               .warm_every = WARM_EVERY};
 #define ENTRY(name) {#name, &s.name}
 static const struct {
@@ -87,6 +88,9 @@ static const struct {
     ENTRY(calibrates),                            /* 0: an update mends nothing */
     ENTRY(inkwell), ENTRY(safety_switch), ENTRY(buttons),
     ENTRY(model),        /* 0 Touch, 1 Touch X, 2 PHANTOM Desktop, 3 PHANTOM Omni, 4 another */
+    ENTRY(input_dof), ENTRY(output_dof), /* 6: tells its orientation, renders torques */
+    ENTRY(turn_x), ENTRY(turn_y), ENTRY(turn_z), /* rad, the handle's rotation vector */
+    ENTRY(torque_x), ENTRY(torque_y), ENTRY(torque_z), /* mN m on the hand */
     ENTRY(error), ENTRY(error_frames), /* code of an error, and the number of next frames that raise it */
     ENTRY(off_frames),   /* frames without force after an error 0200 ... 0203 */
     ENTRY(lost),         /* 1: communication lost for good */
@@ -352,6 +356,20 @@ static void refuse(HDenum code, char asked) {
     raise_error(type && type != asked ? INVALID_INPUT_TYPE : INVALID_ENUM);
 }
 
+/* The handle's matrix column by column: the rotation of its rotation vector by Rodrigues' formula, then its place. */
+static void give_turn(double *values) {
+    const double w[3] = {s.turn_x, s.turn_y, s.turn_z};
+    double angle = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+    double a = angle > 0 ? sin(angle) / angle : 1, b = angle > 0 ? (1 - cos(angle)) / (angle * angle) : 0.5;
+    const double cross[3][3] = {{0, -w[2], w[1]}, {w[2], 0, -w[0]}, {-w[1], w[0], 0}};
+    for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) values[4 * j + i] = (i == j) * cos(angle) + a * cross[i][j] + b * w[i] * w[j];
+        values[4 * j + 3] = 0;
+        values[12 + j] = seen[j];
+    }
+    values[15] = 1;
+}
+
 API void hdGetDoublev(HDenum code, double *values) {
     const double temperature[3] = {0.1, 0.2, 0.1};
     int known = s.gives_limits != 0;
@@ -359,6 +377,7 @@ API void hdGetDoublev(HDenum code, double *values) {
     switch (code) {
     case 0x2050: give(values, 3, seen, 1); return;
     case 0x2051: give(values, 3, seen_speed, 1); return;
+    case 0x2052: give_turn(values); return;
     case 0x2550: known &= give_box(values, 210, 150, 110); break;
     case 0x2551: known &= give_box(values, 80, 60, 35); break;
     case 0x2602: *values = s.stiffness; break;
@@ -375,6 +394,8 @@ API void hdGetIntegerv(HDenum code, int *values) {
     if (!in_time(code)) return;
     switch (code) {
     case 0x2000: *values = (int)s.buttons; return;
+    case 0x2553: *values = (int)s.input_dof; return;
+    case 0x2554: *values = (int)s.output_dof; return;
     case 0x2555: *values = (int)s.calibration_style; return;
     case 0x2600: case 0x2601: *values = (int)s.rate; return;
     default: refuse(code, 'i');
@@ -402,7 +423,9 @@ API const char *hdGetString(HDenum code) {
 }
 
 API void hdSetDoublev(HDenum code, const double *values) {
-    if (code != 0x2700)
+    if (code == 0x2701 && s.output_dof > 5) {
+        if (in_time(code)) s.torque_x = values[0], s.torque_y = values[1], s.torque_z = values[2];
+    } else if (code != 0x2700)
         raise_error(INVALID_ENUM);
     else if (in_time(code))
         give(wanted, 3, values, 1);

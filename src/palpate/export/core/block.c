@@ -110,16 +110,16 @@ PP_PART int pp_find(const unsigned char *bytes, uint64_t size, const unsigned ch
   return 1;
 }
 
-PP_PART int pp_net_fits(const pp_array *net, int32_t n, int32_t felt) {
+PP_PART int pp_net_fits(const pp_array *net, int32_t n, int32_t felt, int32_t outputs) {
   const int32_t *sizes = net[PP_SIZES].whole;
   int32_t i, groups;
   if (!pp_is(&net[PP_SIZES], 7, 1, 0) || sizes[0] != n || n < 1 || n > PP_MOST) return 0;
   if (sizes[1] < 0 || sizes[1] > PP_MOST * PP_MOST || sizes[2] < 0 || sizes[2] > PP_MOST || sizes[3] < 0) return 0;
-  if (sizes[4] != 1 || sizes[5] < 0 || sizes[5] > 2 || sizes[6] != felt * (felt + 1) / 2) return 0;
-  if (!pp_is(&net[PP_SCALES], 2, n, 1) || !pp_dense(&net[PP_TAIL]) || net[PP_TAIL].n[0] < 1 + n) return 0;
+  if (sizes[4] != outputs || sizes[5] < 0 || sizes[5] > 2 || sizes[6] != felt * (felt + 1) / 2) return 0;
+  if (!pp_is(&net[PP_SCALES], 2, n, 1) || !pp_dense(&net[PP_TAIL]) || net[PP_TAIL].n[0] < (1 + n) * outputs) return 0;
   groups = (sizes[3] + PP_LANES - 1) / PP_LANES;
   if (groups == 0) return net[PP_UNITS].n[0] == 0;
-  if (!pp_is(&net[PP_UNITS], groups, sizes[1] + sizes[2] + sizes[6] + 1, 1) || net[PP_UNITS].n[2] != PP_LANES) return 0;
+  if (!pp_is(&net[PP_UNITS], groups, sizes[1] + sizes[2] + sizes[6] + outputs, 1) || net[PP_UNITS].n[2] != PP_LANES) return 0;
   if (sizes[1] == 0) return 1;
   if (!pp_is(&net[PP_LAYOUT], sizes[1], 2, 0)) return 0;
   for (i = 0; i < sizes[1]; i++) {
@@ -221,7 +221,8 @@ PP_PART int pp_open(const unsigned char *bytes, uint64_t size, pp_array *arrays)
   if (head[PP_MEMORY_CODE] < 0 || head[PP_MEMORY_CODE] > 4) return PP_UNKNOWN;
   if (n < 1 || n > PP_MOST || k < 1 || k > 3 || k > n || head[PP_RADIUS_INPUT] >= n) return PP_MISFIT;
   if (!pp_is(&arrays[PP_NUMBERS], 5, 1, 1) || !pp_is(&arrays[PP_LIMITS], 3, n, 1)) return PP_MISFIT;
-  if (!pp_is(&arrays[PP_AXES], k, 3, 1) || !pp_net_fits(arrays + PP_NET, n, k)) return PP_MISFIT;
+  if (!pp_is(&arrays[PP_AXES], k, 3, 1) || !pp_net_fits(arrays + PP_NET, n, k, 1)) return PP_MISFIT;
+  if (arrays[PP_ARM].n[0] > 0 && (k != 3 || !pp_net_fits(arrays + PP_ARM, n, 0, 3))) return PP_MISFIT;
   if (arrays[PP_POINTS].n[0] > 0 && (!pp_is(&arrays[PP_POINTS], n, arrays[PP_POINTS].n[1], 1) ||
                                      arrays[PP_POINTS].n[1] % PP_LANES)) return PP_MISFIT;
   if (!pp_baseline_fits(arrays, head) || !pp_memory_fits(arrays, head)) return PP_MISFIT;

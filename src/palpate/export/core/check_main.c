@@ -57,6 +57,12 @@ int main(void) {
         give(&deviation, 1);
         give(&flags, 1);
       }
+#if CHECK_TORQUE
+      if (question[0] == 4) {
+        OF(_torque)(x, p, answer);
+        give(answer, 3);
+      }
+#endif
 #if CHECK_MEMORY
       if (question[0] == 1) {
         OF(_step)(&state, x, p, dt, answer);

@@ -50,7 +50,7 @@ _LEAST = 1e-6  # keeps the system regular
 
 def border_widths(solves: Solves) -> tuple[float, ...]:
     """Which of `WITHIN` make a difference."""
-    distances = [np.abs(solves.surface.at(np.ascontiguousarray(one.points))[0]) for one in solves.snapshots]
+    distances = [np.abs(solves.surface.at(one.points - solves.shift)[0]) for one in solves.snapshots]
     wide, narrow = ([d < within * solves.radius for d in distances] for within in WITHIN)
     same = all((a == b).all() for a, b in zip(wide, narrow, strict=True))
     return WITHIN[:1] if same else WITHIN
@@ -117,7 +117,7 @@ def _regressors(
 ) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
     """Yield for each solve snapshots and row, nodes in reach (rows,), regressors (rows · components, table.size)."""
     contact_points, normals = solves.contact_points
-    touched = [local_mode.touches(solves.surface, one.points) for one in solves.snapshots]
+    touched = [solves.touched(local_mode, one.points) for one in solves.snapshots]
     for (k, i), contact_point, n, s in zip(solves.rows(), contact_points, normals, solves.depth, strict=True):
         offset = (solves.snapshots[k].points - contact_point) / local_mode.reach
         distance = np.sqrt((offset**2).sum(axis=1))
@@ -208,7 +208,7 @@ def _variation_regressors(
     blank: Variation, local_mode: LocalMode, amplitude: DepthAmplitude, solves: Solves
 ) -> VariationRegressors:
     r, components = blank.table.shape[2], blank.table.shape[4]
-    touched = [np.flatnonzero(local_mode.touches(solves.surface, one.points)) for one in solves.snapshots]
+    touched = [np.flatnonzero(solves.touched(local_mode, one.points)) for one in solves.snapshots]
     contact_points, nodes, near = solves.contact_points[0], [], []
     for (k, _), contact_point in zip(solves.rows(), contact_points, strict=True):
         offset = (solves.snapshots[k].points[touched[k]] - contact_point) / local_mode.reach

@@ -74,11 +74,12 @@ def learn_snapshots(
     radius_input: int | None = None,
     rest: np.ndarray | None = None,
     drawn: CarriedSurface | None = None,
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
     options: FieldOptions,
 ) -> LearntField:
     """Learn a field on a mesh from snapshots on the meshes that they were solved on; the context is `learn_field`'s.
 
-    `drawn` is the body's own surface, which the mesh carries in pictures.
+    `drawn` is the body's own surface, which the mesh carries in pictures; `shift` is that of `FieldSurrogate`.
 
     Raises
     ------
@@ -89,7 +90,7 @@ def learn_snapshots(
     """
     checks.positive("The radius of the probe", radius, "m")
     budget = Budget.of(options.effort, options.seconds)
-    context = (inputs, surface, radius, points, triangles, mass, radius_input)
+    context = (inputs, surface, radius, points, triangles, mass, radius_input, shift)
     solves = Solves.of(snapshots, *context).touching
     tolerance = _TOLERANCE * solves.size if options.tolerance is None else options.tolerance
     length = radius / 10.0 if options.length is None else options.length
@@ -118,6 +119,7 @@ def learn_snapshots(
         local_mode=best.local_mode,
         meta=meta,
         drawn=drawn,
+        shift=shift,
     )
     return LearntField(field, trials, best.truncation, best.truncation_left_out, error)
 

@@ -64,6 +64,8 @@ class Solves:
     radius_input: int | None  # the input that is the radius
     # to that mesh; None where it is the snapshots' own
     interpolations: tuple[SurfaceInterpolation | None, ...]
+    # (3,), m, way from a solve's place to the centre of the ball that touches; `surface` is the body's less it
+    shift: np.ndarray
 
     @classmethod
     def of(
@@ -76,6 +78,7 @@ class Solves:
         triangles: np.ndarray,
         mass: np.ndarray,
         radius_input: int | None = None,
+        shift: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> Solves:
         """All of them, as they are."""
         facing = node_normals(points, triangles)
@@ -86,7 +89,7 @@ class Solves:
             for one in snapshots
         )
         context = (surface, radius, points, triangles, mass, radius_input)
-        return cls(tuple(snapshots), tuple(inputs), *context, interpolations)
+        return cls(tuple(snapshots), tuple(inputs), *context, interpolations, np.array(shift, dtype=float))
 
     @property
     def touching(self) -> Solves:
@@ -137,7 +140,11 @@ class Solves:
         """Touched places at rest and normals there, each (N, 3)."""
         C = np.ascontiguousarray(self.X[:, :3])
         d, normals, _ = self.surface.at(C)
-        return C - d[:, None] * normals, normals
+        return C + self.shift - d[:, None] * normals, normals
+
+    def touched(self, local_mode: LocalMode, points: np.ndarray) -> np.ndarray:
+        """Return which points (P, 3) in m a local mode moves, (P,) bool."""
+        return local_mode.touches(self.surface, points - self.shift)
 
     @property
     def values(self) -> list[np.ndarray]:
@@ -192,7 +199,7 @@ class Solves:
             return whole
         shown = self.moving(local_mode, amplitude)
         rest = self._interpolated([u - one for u, one in zip(self.values, shown, strict=True)])
-        return np.where(local_mode.touches(self.surface, self.points)[:, None], rest, whole)
+        return np.where(self.touched(local_mode, self.points)[:, None], rest, whole)
 
     def _interpolated(self, fields: Sequence[np.ndarray]) -> np.ndarray:
         both = zip(self.interpolations, fields, strict=True)

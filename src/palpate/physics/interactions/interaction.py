@@ -126,13 +126,15 @@ class Attached:
         going straight from `approach`; by default the Euclidean length.
     first_step : float
         Longest first step along a path, as such a length; later ones adapt.
-    shifts : (n, dof) array, optional
-        For energies of X + u − q alone, as a rigid tool's: unknowns of a constant displacement along each input. The
-        energies change with an input as they do with the unknowns the other way, so all their derivatives by inputs
-        follow from those by unknowns, and none is taken symbolically.
+    shifts : (3, dof) array, optional
+        For energies of Rᵀ(X + u − p) alone, as a rigid tool's, whose place p are the first inputs: unknowns of a
+        constant displacement along each. The energies change with p as they do with the unknowns the other way, so
+        all their derivatives by inputs follow from those by unknowns, and none is taken symbolically.
     turns : callable, optional
-        Gives for inputs (n,) the unknowns (3, dof) by which the body under inspection turns rigidly about x, y and z
-        through the tool's place: the torque on the tool is what its energies change by.
+        Gives for unknowns (dof,) and inputs (n,) the unknowns (3, dof) by which the displaced body turns rigidly about
+        x, y and z through the tool's place: the torque on the tool is what its energies change by.
+    rates : callable, optional
+        Gives for inputs (n,) the turn (n − 3, 3) of the tool about x, y and z by one unit of each further input.
     stiffen : callable, optional
         Gives a very stiff pad a share of its stiffness, 1 after attaching: a path is easier under a softer one.
     """
@@ -147,7 +149,8 @@ class Attached:
     distance: Callable[[np.ndarray, np.ndarray], float] | None = None
     first_step: float = np.inf
     shifts: np.ndarray | None = None
-    turns: Callable[[np.ndarray], np.ndarray] | None = None
+    turns: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+    rates: Callable[[np.ndarray], np.ndarray] | None = None
     stiffen: Callable[[float], None] | None = None
 
 

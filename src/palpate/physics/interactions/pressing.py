@@ -1,7 +1,7 @@
 """Rigid tools that press a surface without friction: their places, their way there, their contact energy.
 
-A tool has a fixed orientation, and the three coordinates of its place are the inputs. What is a tool's place, and how
-high above its contact point that is, the tool says itself: of a `SphereProbe` it is the centre.
+The three coordinates of a tool's place are its first inputs; angles may follow, where its orientation is one. What is a
+tool's place, and how high above its contact point that is, the tool says itself: of a `SphereProbe` it is the centre.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ Corner = tuple[float, ...]
 class PressingTool(PlainInteraction):
     """Base of interactions that press a surface with a rigid tool, frozen dataclasses.
 
-    The input is the tool's place. A subclass says what shape it has, and where its place is.
+    The inputs are the tool's place, then its angles, if any. A subclass says what shape it has, and where its place is.
     """
 
     shape: Tool  # in its own frame
@@ -68,17 +68,29 @@ class PressingTool(PlainInteraction):
         return None
 
     @property
-    def turn(self) -> np.ndarray | None:
-        """Rotation (3, 3) from the tool's frame to the body's; None for none."""
-        return None
+    def front(self) -> float:
+        """Distance in m from the tool's place to its shape's centre, against its own axis."""
+        return 0.0
 
     @property
-    def to_centre(self) -> np.ndarray | None:
-        """Way (3,) in m from the tool's place to its shape's centre; None where they are one."""
-        return None
+    def angles(self) -> tuple[Range, ...]:
+        """Names and ranges in rad of the k inputs after the place."""
+        return ()
 
-    def offset(self, normals: np.ndarray) -> np.ndarray:
-        """Return how high (N,) in m the place is above a plane of unit normals (N, 3) that the tool just touches."""
+    def spread_angles(self, unit: np.ndarray) -> np.ndarray:
+        """Return angles (N, k) in rad, even over all orientations, from k coordinates (N, k) between 0 and 1."""
+        return unit
+
+    def pose(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return place (..., 3) in m and rotation (..., 3, 3) of the tool at inputs (..., 3 + k)."""
+        x = np.asarray(x, dtype=float)
+        return x[..., :3], np.broadcast_to(np.eye(3), (*x.shape[:-1], 3, 3))
+
+    def offset(self, normals: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        """Return how high (N,) in m the place is above a plane that the tool just touches.
+
+        The planes have unit normals (N, 3), the tool angles (N, k) in rad.
+        """
         raise NotImplementedError
 
     def contact_radius(self, depth: float) -> float:
@@ -114,11 +126,13 @@ class PressingTool(PlainInteraction):
             painted = self._paint(geometry)
             corners = np.unique(painted.triangles)
             contacts, normals = painted.points[corners], painted.node_normals[corners]
-        offset = self.offset(normals)
-        ends = [contacts + normals * (offset - d)[:, None] for d in self.depth]
+        ends = []
+        for angles in self.spread_angles(_rim_of(len(self.angles))):
+            offset = self.offset(normals, np.broadcast_to(angles, (len(normals), angles.size)))
+            ends += [contacts + normals * (offset - d)[:, None] for d in self.depth]
         low, high = np.concatenate(ends).min(axis=0), np.concatenate(ends).max(axis=0)
         pairs = zip("xyz", low.tolist(), high.tolist(), strict=True)
-        return tuple(Range(f"{self.symbol}_{axis}", a, b, "m") for axis, a, b in pairs)
+        return (*(Range(f"{self.symbol}_{axis}", a, b, "m") for axis, a, b in pairs), *self.angles)
 
     def refinements(self, geometry: Geometry) -> tuple[FineMesh, ...]:
         """Return small elements wherever it may touch."""
@@ -129,56 +143,81 @@ class PressingTool(PlainInteraction):
         return (FineMesh(self.meets, element, tuple(low.tolist()), tuple(high.tolist())),)
 
     def design(self, geometry: Geometry, samples: int, seed: int, depths: int | None = None) -> np.ndarray:
-        """Return positions (samples, 3) in m in depth series, each from shallow to deep.
+        """Return inputs (samples, 3 + k) in depth series, each from shallow to deep in one orientation.
 
         The contact points are a scrambled Sobol sequence (Sobol 1967; Owen 1998) over the touched part of the
         surface, denser towards sides where the surface ends; the depths of a series are evenly spaced, all shifted by a
-        random share of their distance. `depths` is their number in a series, by default about ¾ √samples.
+        random share of their distance. `depths` is their number in a series, by default about ¾ √samples, and of a tool
+        that turns the (3 + k)-th root of the samples: as many as of places and angles along each.
 
         With a rim the contact points are far from each other all over the touched surface, so that any first few are
         spread (see `spread_places`); of one depth each, the depths are a golden sequence.
         """
-        count = depths_per_series(samples) if depths is None else depths
+        count = depths_per_series(samples, 3 + len(self.angles)) if depths is None else depths
         if self.rim is not None:
             return self._spread_design(geometry, samples, seed, count)
         from scipy.stats import qmc
 
         number = -(-samples // count)
-        engine = qmc.Sobol(3, scramble=True, rng=np.random.default_rng(seed))
-        unit, contacts = np.empty((0, 3)), np.empty((0, 3))
+        engine = qmc.Sobol(3 + len(self.angles), scramble=True, rng=np.random.default_rng(seed))
+        unit, contacts = np.empty((0, 3 + len(self.angles))), np.empty((0, 3))
         while len(contacts) < number:  # a surface need not fill its box
             unit = np.concatenate([unit, engine.random(1 << max(3, int(np.ceil(np.log2(number)))))])
             contacts, normals, hit = self._contact_points(self._patch(geometry), unit[:, :2])
-        lines = zip(contacts[:number], normals, unit[hit, 2], strict=False)
-        points = [self._series(contact, normal, count, shift) for contact, normal, shift in lines]
-        return np.concatenate(points)[:samples]
+        depths = np.array([depth_series(self.depth, count, shift) for shift in unit[hit][:number, 2]])
+        rows = self._over(
+            contacts[:number], normals[:number], depths, self.spread_angles(unit[hit][:number, 3:])
+        )
+        return rows[:samples]
 
     def _spread_design(self, geometry: Geometry, samples: int, seed: int, count: int) -> np.ndarray:
-        """Return positions (samples, 3) in m over places that are far from each other."""
+        """Return inputs (samples, 3 + k) over places that are far from each other."""
         number = -(-samples // count)
         contacts, normals = spread_places(self._paint(geometry), number, seed)
         width = (self.depth[1] - self.depth[0]) / count
         first = depth_sequence((self.depth[0], self.depth[0] + width), number, seed)
         depths = first[:, None] + width * np.arange(count)
-        points = contacts[:, None] + (self.offset(normals)[:, None] - depths)[:, :, None] * normals[:, None]
-        return np.asarray(points.reshape(-1, 3)[:samples])
+        unit = np.random.default_rng(seed).random((number, len(self.angles)))
+        return self._over(contacts, normals, depths, self.spread_angles(unit))[:samples]
+
+    def _over(
+        self, contacts: np.ndarray, normals: np.ndarray, depths: np.ndarray, angles: np.ndarray
+    ) -> np.ndarray:
+        """Return inputs (N · d, 3 + k) over contact points (N, 3) of unit normals (N, 3) at depths (N, d) in m."""
+        heights = self.offset(normals, angles)[:, None] - depths
+        places = contacts[:, None] + heights[:, :, None] * normals[:, None]
+        repeated = np.broadcast_to(angles[:, None], (*heights.shape, angles.shape[1]))
+        return np.concatenate([places, repeated], axis=2).reshape(-1, 3 + angles.shape[1])
 
     def random_presses(self, geometry: Geometry, samples: int, seed: int) -> np.ndarray:
-        """Return positions (samples, 3) in m, independent of each other, even over the touched area and all depths.
+        """Return inputs (samples, 3 + k), independent of each other, even over the touched area, depths and angles.
 
         They judge a surrogate by what was to be touched, margin and rim of its design aside.
         """
         rng = np.random.default_rng(seed)
         touched = surface_of(geometry, self.touches, self.refinements(geometry))
         contacts, normals = touched.spread_with_normals(rng.random((samples, 2)))
-        depths = rng.uniform(*self.depth, samples)
-        return np.asarray(contacts + (self.offset(normals) - depths)[:, None] * normals)
+        depths = rng.uniform(*self.depth, (samples, 1))
+        return self._over(
+            contacts, normals, depths, self.spread_angles(rng.random((samples, len(self.angles))))
+        )
 
     def chains(self, geometry: Geometry, points: np.ndarray) -> list[np.ndarray]:
-        """Return rows of positions (N, 3) in chains: depth series, else neighbours, from shallow to deep."""
-        centres = np.asarray(points, dtype=float)
-        contacts, distance = contact_points(self._patch(geometry), centres)
-        return group_into_chains(centres, contacts, distance, self.shape.size)
+        """Return rows of inputs (N, 3 + k) in chains: depth series of one orientation, from shallow to deep.
+
+        Without angles places that stand alone are chained with their neighbours.
+        """
+        rows = np.asarray(points, dtype=float)
+        contacts, distance = contact_points(self._patch(geometry), rows[:, :3])
+        _, first, which = np.unique(rows[:, 3:], axis=0, return_index=True, return_inverse=True)
+        chains = []
+        for one in np.argsort(first):  # the order of the points
+            own = np.flatnonzero(which.ravel() == one)
+            chains += [
+                own[chain]
+                for chain in group_into_chains(rows[own, :3], contacts[own], distance[own], self.shape.size)
+            ]
+        return chains
 
     def attach(self, field: Field) -> Attached:
         """Return its contact energy on an opened body.
@@ -202,13 +241,13 @@ class PressingTool(PlainInteraction):
 
         from palpate.physics.interactions.tool_contact import Contact, pad_energy
 
-        contact = Contact(field, field.rest, self.meets, self.shape, self.stop, self.turn, self.to_centre)
-        centre = tuple(ngsolve.Parameter(0.0) for _ in range(3))
-        penetration = contact.penetration(field.trial, ngsolve.CF(centre))
+        contact = Contact(field, field.rest, self)
+        inputs = tuple(ngsolve.Parameter(0.0) for _ in range(3 + len(self.angles)))
+        penetration = contact.penetration(field.trial, inputs)
         energy = Energy(pad_energy(penetration, pad, self.stop), contact.measure())
         approach = _Approach(self, field, contact)
         return Attached(
-            centre,
+            inputs,
             (energy,),
             inspect=contact.inspect,
             approach=approach,
@@ -273,11 +312,6 @@ class PressingTool(PlainInteraction):
             )
         return contacts, np.array([patch.nearest(contact)[1] for contact in contacts]), hit
 
-    def _series(self, contact: np.ndarray, normal: np.ndarray, count: int, shift: float) -> np.ndarray:
-        """Return centres (count, 3) in m above one contact point."""
-        depths = depth_series(self.depth, count, shift)
-        return np.asarray(contact + normal * (self.offset(normal[None]) - depths)[:, None])
-
 
 class _Approach:
     """The straight line along which a tool comes to a position from outside."""
@@ -294,33 +328,49 @@ class _Approach:
             self._known = Patch.from_mesh(self._field.rest, self._probe.meets, displacement)
         return self._known
 
-    def __call__(self, centre: np.ndarray) -> np.ndarray | None:
-        """Return the first position (3,) from `centre` along the outward normal that is clear of the surface.
+    def __call__(self, x: np.ndarray) -> np.ndarray | None:
+        """Return the first inputs (3 + k,) along the outward normal from x at which the tool is clear of the surface.
 
-        None where there is none, or a fixed surface is in the way from there.
+        The angles stay. None where there are none, or a fixed surface is in the way from there.
         """
         clear, patch = CLEAR * self._probe.shape.size, self._patch
-        _, normal, distance = patch.nearest(centre)
-        place = np.array(centre, dtype=float)
+        _, normal, distance = patch.nearest(x[:3])
+        offset = float(self._probe.offset(normal[None], x[None, 3:])[0])
+        away = np.array(x, dtype=float)
         for _ in range(MOST_STEPS):
             # the triangles are straight, the surface that the contact's energy sees may bulge out of them
-            offset = float(self._probe.offset(normal[None])[0])
-            overlap = max(offset - clear - distance, self._contact.overlap(place))
+            overlap = max(offset - clear - distance, self._contact.overlap(away))
             if overlap <= 0:
-                return None if self._contact.meets_fixed_part(place, centre) else place
-            place = place + (overlap + clear) * normal
-            distance = patch.nearest(place)[2]
+                return None if self._contact.meets_fixed_part(away, x) else away
+            away[:3] += (overlap + clear) * normal
+            distance = patch.nearest(away[:3])[2]
         return None
 
     def distance(self, here: np.ndarray, there: np.ndarray) -> float:
-        """Return the length in m of a way between two positions, its part along the surface counted several times."""
-        normal = self._patch.nearest(there)[1]
-        step = there - here
+        """Return the length in m of a way between two inputs, its part along the surface counted several times.
+
+        So are turns, by the way of a point at the distance of the tool's size.
+        """
+        normal = self._patch.nearest(there[:3])[1]
+        step, turn = (
+            there[:3] - here[:3],
+            self._probe.shape.size * float(np.linalg.norm(there[3:] - here[3:])),
+        )
         along = float(step @ normal)
-        return float(np.hypot(along, SIDEWAYS * np.linalg.norm(step - along * normal)))
+        return float(np.hypot(along, SIDEWAYS * np.hypot(np.linalg.norm(step - along * normal), turn)))
 
 
 _GRID = np.stack(np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9)), axis=-1).reshape(-1, 2)
+
+
+def _rim_of(count: int) -> np.ndarray:
+    """Return coordinates (m, count) between 0 and 1 of angles in the middle and at the ends of their ranges."""
+    if not count:
+        return np.zeros((1, 0))
+    rim = np.array([[0.0, 0.0], *([1.0, i / 16] for i in range(16))])
+    if count == 2:
+        return rim
+    return np.array([[*tilt, twist] for tilt in rim for twist in np.linspace(0.0, 1.0, 5)])
 
 
 def _denser(unit: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

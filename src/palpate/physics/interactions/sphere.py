@@ -106,8 +106,9 @@ class SphereProbe(PressingTool):
         """The ball."""
         return Sphere(self.radius)
 
-    def offset(self, normals: np.ndarray) -> np.ndarray:
+    def offset(self, normals: np.ndarray, angles: np.ndarray) -> np.ndarray:
         """Return the radius (N,) in m for each of the outward unit normals (N, 3): so high is the centre at a touch."""
+        del angles
         return np.full(len(normals), self.radius)
 
     def contact_radius(self, depth: float) -> float:

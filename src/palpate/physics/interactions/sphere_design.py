@@ -23,12 +23,14 @@ NEAR = 8  # most scattered points in a chain
 UPRIGHT = 1e-6  # by how much a plane's normal may fall short of an axis
 
 
-def depths_per_series(samples: int) -> int:
+def depths_per_series(samples: int, inputs: int = 3) -> int:
     """Return the number of depths in a series of a design of so many samples: about ¾ √samples.
 
-    So the distance of the series, on the surface's scale, is about that of the depths.
+    So the distance of the series, on the surface's scale, is about that of the depths. Of more inputs than a place each
+    gets the same number of values.
     """
-    return int(np.clip(round(0.75 * np.sqrt(samples)), 1, LONGEST))
+    count = 0.75 * np.sqrt(samples) if inputs == 3 else samples ** (1 / inputs)
+    return int(np.clip(round(count), 1, LONGEST))
 
 
 def depth_series(depth: tuple[float, float], count: int, shift: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A rigid tool of any shape that presses a surface, in an orientation that stays."""
+"""A rigid tool of any shape that presses a surface, in an orientation that stays or is an input."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from palpate.physics.interactions.interaction_checks import range_of
 from palpate.physics.interactions.pressing import Corner, PressingTool, checked_box
 from palpate.physics.interactions.sphere import RIGID, require_pad
 from palpate.physics.interactions.surface_patch import Patch
-from palpate.tools import PosedTool, Tool
+from palpate.tools import PosedTool, Tool, Turns, left_jacobian
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -34,11 +34,14 @@ STOP = 0.004  # penetration in m at which a pad is fully pressed, at most
 
 @dataclass(frozen=True)
 class SurfaceTool(PressingTool):
-    """A rigid tool with a compliant skin (the pad), whose place p = (tip_x, tip_y, tip_z) is the input.
+    """A rigid tool with a compliant skin (the pad), whose place p = (tip_x, tip_y, tip_z) is an input.
 
-    The place is the tool's foremost point along its own axis, which is −z unless it is turned. The response is the
-    force on the tool, -∂U/∂p in N; the torque on it about its place stands beside it in the solution. The equilibrium
-    meant is the one that is reached along a straight line from outside, along the surface's outward normal.
+    The place is the tool's foremost point along its own axis, which is −z unless it is turned. The orientation may be
+    an input too: components in rad of a rotation vector w = (tip_rx, tip_ry, tip_rz) in the frame of the body, which
+    turns the tool after `rotation`, R = exp [w]× R₀. The response is −∂U by the inputs: the force on the tool in N,
+    then what the torque does along w, Jᵀ T in N m (see `palpate.tools.left_jacobian`). The torque T about the place
+    stands beside it in the solution. The equilibrium meant is the one that is reached along a straight line from
+    outside, along the surface's outward normal, in one orientation.
 
     Attributes
     ----------
@@ -58,6 +61,11 @@ class SurfaceTool(PressingTool):
     rotation : tuple of three floats
         Rotation vector in rad by which the tool is turned about its place: its direction is the axis, its length the
         angle. Zero for a tool that points along −z.
+    turns : {"fixed", "axis", "full"}
+        What of the orientation is an input: nothing, tip_rx and tip_ry, or tip_rz as well.
+    tilt : float
+        Largest angle in rad of (tip_rx, tip_ry), below π/2, and of tip_rz to both sides. Not used, and set to 0, where
+        the orientation is fixed.
     element : float, optional
         Size in m of the elements under the tool; by default half of its radius, at most twice the radius of its edge.
 
@@ -75,12 +83,15 @@ class SurfaceTool(PressingTool):
     over: tuple[Corner, Corner] | None = None
     rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     element: float | None = None
+    turns: Turns = "fixed"
+    tilt: float = 0.35
 
     rim = None
     symbol = "tip"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", self.posed_tool.rotation)
+        for name in ("rotation", "tilt"):
+            object.__setattr__(self, name, getattr(self.posed_tool, name))
         if self.pad != RIGID:
             require_pad(self.pad)
         object.__setattr__(self, "depth", range_of("The depth of a tool", self.depth, "m"))
@@ -96,7 +107,8 @@ class SurfaceTool(PressingTool):
 
     def describe(self) -> dict[str, Any]:
         """Return everything that decides its energy, as plain data for a JSON file."""
-        return {**super().describe(), **self.posed_tool.describe()}
+        plain = {name: value for name, value in super().describe().items() if name not in ("turns", "tilt")}
+        return {**plain, **self.posed_tool.describe()}
 
     @property
     def stop(self) -> float | None:
@@ -106,24 +118,35 @@ class SurfaceTool(PressingTool):
     @property
     def posed_tool(self) -> PosedTool:
         """The tool in its orientation."""
-        return PosedTool(self.shape, self.rotation)
+        return PosedTool(self.shape, self.rotation, self.turns, self.tilt)
 
     @property
-    def turn(self) -> np.ndarray | None:
-        """Rotation (3, 3) from the tool's frame to the body's; None for none."""
-        return self.posed_tool.turn
+    def front(self) -> float:
+        """Distance in m from the tool's place to its shape's centre, against its own axis."""
+        return self.shape.front
 
     @property
-    def to_centre(self) -> np.ndarray:
-        """Way (3,) in m from the tool's place to its shape's centre."""
-        return self.posed_tool.to_centre
+    def angles(self) -> tuple[Range, ...]:
+        """Names and ranges in rad of the k inputs after the place."""
+        return self.posed_tool.angles
 
-    def offset(self, normals: np.ndarray) -> np.ndarray:
-        """Return how high (N,) in m the place is above a plane of unit normals (N, 3) that the tool just touches."""
-        return np.asarray(self.posed_tool.reach(normals) - normals @ self.to_centre)
+    def spread_angles(self, unit: np.ndarray) -> np.ndarray:
+        """Return angles (N, k) in rad, even over the disc of all tilts, from k coordinates (N, k) between 0 and 1."""
+        return self.posed_tool.spread_angles(unit)
+
+    def pose(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return place (..., 3) in m and rotation (..., 3, 3), to the body's frame, at inputs (..., 3 + k)."""
+        return self.posed_tool.pose(x)
+
+    def offset(self, normals: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        """Return how high (N,) in m the place is above a plane that the tool just touches.
+
+        The planes have unit normals (N, 3), the tool angles (N, k) in rad.
+        """
+        return self.posed_tool.offset(normals, angles)
 
     def ranges(self, geometry: Geometry) -> tuple[Range, ...]:
-        """Return the ranges of tip_x, tip_y and tip_z in m: the box around all its places."""
+        """Return the ranges of tip_x, tip_y and tip_z in m, the box around all its places, then those of its angles."""
         self._require_room(geometry)
         return super().ranges(geometry)
 
@@ -162,7 +185,8 @@ class SurfaceTool(PressingTool):
     def _half_widths(self) -> np.ndarray:
         """Return half the widths (2,) in m of the cut at the largest depth; turned, of the circle around it."""
         half = np.array(self.shape.half_widths(max(self.depth)))
-        return half if self.turn is None else np.full(2, np.linalg.norm(half))
+        stays = self.turns == "fixed" and not any(self.rotation)
+        return half if stays else np.full(2, np.linalg.norm(half))
 
     @property
     def _inset(self) -> float:
@@ -199,19 +223,17 @@ class SurfaceTool(PressingTool):
         attached = super().attach_pad(field, pad)
         axes = np.eye(3)
         shifts = np.array([field.interpolate(ngsolve.CF(tuple(axis))) for axis in axes.tolist()])
+        rest = field.interpolate(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z)))
+        size = len(field.base.vec)
 
-        def turns(place: np.ndarray) -> np.ndarray:
-            arm = (
-                ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z)) + field.displacement - ngsolve.CF(tuple(place))
-            )
-            return np.array([field.interpolate(_cross(axis, arm)) for axis in axes.tolist()])
+        def turns(z: np.ndarray, q: np.ndarray) -> np.ndarray:
+            arm = (rest + z - q[:3] @ shifts)[:size].reshape(3, -1).T
+            turned = np.zeros((3, z.size))
+            turned[:, :size] = np.cross(axes[:, None], arm).transpose(0, 2, 1).reshape(3, -1)
+            return turned
 
-        return replace(attached, shifts=shifts, turns=turns)
+        def rates(q: np.ndarray) -> np.ndarray:
+            w = np.append(q[3:], np.zeros(6 - q.size))
+            return np.asarray(left_jacobian(w).T[: q.size - 3])
 
-
-def _cross(axis: list[float], arm: Any) -> Any:
-    """Return the product axis × arm as a coefficient function."""
-    import ngsolve
-
-    a, b, c = axis
-    return ngsolve.CF((b * arm[2] - c * arm[1], c * arm[0] - a * arm[2], a * arm[1] - b * arm[0]))
+        return replace(attached, shifts=shifts, turns=turns, rates=rates if self.angles else None)

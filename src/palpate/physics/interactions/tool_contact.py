@@ -1,6 +1,7 @@
 """Frictionless contact of a rigid tool with a surface, as an energy of a pad with a stop.
 
-A tool of signed distance d in its own frame, turned by R, with its centre at c, penetrates the surface by
+A tool of signed distance d in its own frame, turned by R, with its centre at c = p + f R e_z, f in front of which its
+place p is, penetrates the surface by
 
     p = -d(Rᵀ(X + u - c)),
 
@@ -17,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,7 +27,9 @@ from palpate.physics.interactions.surface_patch import Patch
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.surface_checks import winding_number
 from palpate.physics.stop import Stop, Verdict
-from palpate.tools import Tool
+
+if TYPE_CHECKING:
+    from palpate.physics.interactions.pressing import PressingTool
 
 __all__ = ["REACH", "Contact", "pad_energy", "pressed_energy"]
 
@@ -35,6 +38,7 @@ BONUS = 6  # orders of quadrature beyond the elements' own: contact has an edge 
 WAY = 0.05  # distance of the places at which a tool's way is looked at, over its inscribed radius
 # cosine from a surface's normal to the way into the tool, below which the surface faces away: a fold of it takes less
 FACING_AWAY = -0.1
+TINY = 1e-12  # rad; keeps the angle of a rotation differentiable at zero
 
 
 def pressed_energy(penetration: Any, pad: float, stop: float | None) -> Any:
@@ -61,83 +65,84 @@ def pad_energy(penetration: Any, pad: float, stop: float | None) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A tool and the quadrature points of the surface that it may touch; its inputs are its place."""
+    """A tool and the quadrature points of the surface that it may touch."""
 
     field: Field
     mesh: BodyMesh  # the body at rest, its nodes those of the field's mesh
-    surface: str
-    shape: Tool
-    stop: float | None  # p_m, m; None for a pad without a stop
-    turn: np.ndarray | None = None  # R (3, 3); None for none
-    to_centre: np.ndarray | None = (
-        None  # way (3,) from the place to the shape's centre, m; None where they are one
-    )
+    tool: PressingTool
+
+    @property
+    def stop(self) -> float | None:
+        """Penetration p_m in m at which the pad is fully pressed; None for a pad without a stop."""
+        return self.tool.stop
 
     def measure(self) -> Any:
         """Return the surface's differential symbol."""
         import ngsolve
 
-        return ngsolve.ds(definedon=self.field.surface(self.surface), bonus_intorder=BONUS)
+        return ngsolve.ds(definedon=self.field.surface(self.tool.meets), bonus_intorder=BONUS)
 
-    def penetration(self, displacement: Any, place: Any) -> Any:
-        """Return p = -d(Rᵀ(X + u - c)) as a coefficient function, positive in contact."""
+    def penetration(self, displacement: Any, inputs: tuple[Any, ...]) -> Any:
+        """Return p = -d(Rᵀ(X + u - c)) as a coefficient function of the inputs' parameters, positive in contact."""
         import ngsolve as ngs
 
-        to_surface = ngs.CF((ngs.x, ngs.y, ngs.z)) + displacement - place
-        if self.to_centre is not None:
-            to_surface = to_surface - ngs.CF(tuple(self.to_centre.tolist()))
-        if self.turn is not None:
-            to_surface = ngs.CF(tuple(self.turn.T.ravel().tolist()), dims=(3, 3)) * to_surface
-        return -self.shape.distance(to_surface)
+        from_place = ngs.CF((ngs.x, ngs.y, ngs.z)) + displacement - ngs.CF(inputs[:3])
+        if len(inputs) > 3:
+            from_place = _rotation_field(inputs[3:]).trans * from_place
+        turn = self.tool.pose(np.zeros(len(inputs)))[1]
+        if not np.array_equal(turn, np.eye(3)):
+            from_place = ngs.CF(tuple(turn.T.ravel().tolist()), dims=(3, 3)) * from_place
+        if self.tool.front:
+            from_place = from_place - ngs.CF((0.0, 0.0, self.tool.front))
+        return -self.tool.shape.distance(from_place)
 
-    def _in_frame(self, points: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Return points (N, 3) in m in the tool's own frame."""
-        away = points - self._centre(place)
-        return away if self.turn is None else np.asarray(away @ self.turn)
+    def _in_frame(self, points: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Return points (N, 3) in m in the tool's own frame at inputs (3 + k,)."""
+        place, turn = self.tool.pose(x)
+        return np.asarray((points - place) @ turn - [0.0, 0.0, self.tool.front])
 
-    def _centre(self, place: np.ndarray) -> np.ndarray:
-        return place if self.to_centre is None else place + self.to_centre
+    def _centre(self, x: np.ndarray) -> np.ndarray:
+        place, turn = self.tool.pose(x)
+        return np.asarray(place + self.tool.front * turn[:, 2])
 
-    def inspect(self, place: np.ndarray) -> Verdict:
-        """Return a verdict on the state in `field.displacement` under a tool at (3,) m.
+    def inspect(self, x: np.ndarray) -> Verdict:
+        """Return a verdict on the state in `field.displacement` under a tool at inputs (3 + k,).
 
         The surface must not be pressed past the pad's stop; where it is pressed it must face into the tool, so that
         the pad pushes and never pulls; and the tool's centre must be outside the deformed body.
         """
         places, normals = self._deformed_surface()
-        own = self._in_frame(places, place)
-        penetration = -self.shape.distance(own)
+        own = self._in_frame(places, x)
+        penetration = -self.tool.shape.distance(own)
         figures = {"penetration": max(0.0, float(penetration.max()))}
         if self.stop is not None and figures["penetration"] > REACH * self.stop:
             detail = f"{1e3 * figures['penetration']:.3g} mm of {1e3 * self.stop:.3g} mm"
             return Verdict(Stop.PAST_STOP, detail, figures)
         pressed = penetration > 0
-        inwards = -self.shape.gradient(own[pressed])
-        inwards = inwards if self.turn is None else inwards @ self.turn.T
+        inwards = -self.tool.shape.gradient(own[pressed]) @ self.tool.pose(x)[1].T
         cosines = np.einsum("ni,ni->n", inwards, normals[pressed])
         if cosines.size and cosines.min() < FACING_AWAY:
             return Verdict(Stop.THROUGH_SURFACE, "a pressed part of the surface faces away from it", figures)
-        if self._inside(self._centre(place)):
+        if self._inside(self._centre(x)):
             return Verdict(Stop.THROUGH_SURFACE, "the deformed body encloses it", figures)
         return Verdict(figures=figures)
 
-    def overlap(self, place: np.ndarray) -> float:
-        """Return the depth in m of a tool at (3,) m in the surface in its base state; negative outside."""
-        return float(-self.shape.distance(self._in_frame(self._places, place)).min())
+    def overlap(self, x: np.ndarray) -> float:
+        """Return the depth in m of a tool at inputs (3 + k,) in the surface in its base state; negative outside."""
+        return float(-self.tool.shape.distance(self._in_frame(self._places, x)).min())
 
-    def meets_fixed_part(self, outside: np.ndarray, place: np.ndarray) -> bool:
-        """Return whether a tool on its way from `outside` (3,) to `place` (3,) in m must overlap a fixed surface.
+    def meets_fixed_part(self, outside: np.ndarray, x: np.ndarray) -> bool:
+        """Return whether a tool on its way from inputs `outside` to x, both (3 + k,), must overlap a fixed surface.
 
         A fixed surface stays where it is, so the body reaches up to it. A centre on the body's side of it that is
         nearer than the tool's inscribed radius less what the pad yields would have the body pressed past the stop.
         """
         if self.stop is None or self._fixed_part is None:
             return False
-        reach = self.shape.inscribed_radius - self.stop
-        count = max(
-            2, int(np.ceil(np.linalg.norm(place - outside) / (WAY * self.shape.inscribed_radius))) + 1
-        )
-        way = self._centre(outside) + np.linspace(0, 1, count)[:, None] * (place - outside)
+        radius, start, end = self.tool.shape.inscribed_radius, self._centre(outside), self._centre(x)
+        reach = radius - self.stop
+        count = max(2, int(np.ceil(np.linalg.norm(end - start) / (WAY * radius))) + 1)
+        way = start + np.linspace(0, 1, count)[:, None] * (end - start)
         low, high = self._fixed_part.box
         near = (way > low - reach).all(axis=1) & (way < high + reach).all(axis=1)
         return any(-reach < self._fixed_part.nearest(middle)[2] < 0 for middle in way[near])
@@ -174,8 +179,20 @@ class Contact:
 
         order = 2 * self.field.displacement.space.globalorder + BONUS
         rule = ngs.IntegrationRule(ngs.ET.TRIG, order)
-        return self.field.mesh.MapToAllElements(rule, self.field.surface(self.surface))
+        return self.field.mesh.MapToAllElements(rule, self.field.surface(self.tool.meets))
 
     def _inside(self, centre: np.ndarray) -> bool:
         points = self.mesh.points + self.field.at_nodes()
         return winding_number(points[self.mesh.triangles], centre) > 0.5
+
+
+def _rotation_field(angles: tuple[Any, ...]) -> Any:
+    """Return the rotation (3, 3) by parameters of a rotation vector, its last component 0 where there are two."""
+    import ngsolve as ngs
+
+    a, b, c = (*angles, *[ngs.CF(0.0)] * (3 - len(angles)))
+    # half the angle, off zero by far less than rounding of the rotation can show
+    half = ngs.sqrt(a * a + b * b + c * c + TINY**2) / 2
+    first, second = ngs.sin(half) * ngs.cos(half) / half, (ngs.sin(half) / half) ** 2 / 2
+    K = ngs.CF((0.0, -c, b, c, 0.0, -a, -b, a, 0.0), dims=(3, 3))
+    return ngs.Id(3) + first * K + second * K * K

@@ -6,6 +6,7 @@
     stretches      sums of powers of the principal stretches
     linear, st_venant, neo_hooke, mooney_rivlin, ogden, yeoh, fibres    elastic laws, one a file
     pre_stretched  a law in tension before anything touches it
+    lumped         a law with a ball of another stiffness in it
     user           a law from one function
     viscous, prony     Prony viscoelasticity over an elastic law
     plastic, hardening J2 plasticity, and the flow stress of a metal
@@ -26,6 +27,7 @@ from palpate.physics.materials.fit_relaxation import RelaxationFit, fit_relaxati
 from palpate.physics.materials.hardening import LinearHardening, VoceHardening
 from palpate.physics.materials.library import MATERIALS, named_material
 from palpate.physics.materials.linear import LinearElastic
+from palpate.physics.materials.lumped import Lumped
 from palpate.physics.materials.material import Elastic, Material, StateVariable, Volumetric
 from palpate.physics.materials.material_fit import MaterialFit
 from palpate.physics.materials.material_stability import ModeStability, Stability
@@ -49,6 +51,7 @@ __all__ = [
     "IndentationTest",
     "LinearElastic",
     "LinearHardening",
+    "Lumped",
     "Material",
     "MaterialFit",
     "ModeStability",

@@ -86,6 +86,11 @@ class Volumetric:
         """½ · modulus · measure(F)², in J/m³."""
         return 0.5 * self.modulus * self.measure(F) ** 2
 
+    def mixed(self, F: Tensor, pressure: Scalar) -> Scalar:
+        """Return p · measure(F) − p²/(2 · modulus), in J/m³: stationary in p it is the energy."""
+        density = pressure * self.measure(F)
+        return density if np.isinf(self.modulus) else density - pressure**2 / (2 * self.modulus)
+
 
 @dataclass(frozen=True)
 class StateVariable:
@@ -187,6 +192,7 @@ class Elastic:
     source: str
     density: float
     law: ClassVar[str] = "elastic"
+    quadrature: ClassVar[int] = 0  # orders of integration that the law needs beyond those of a uniform one
     kinematics: ClassVar[Literal["large", "small"]] = "large"
     states: ClassVar[tuple[StateVariable, ...]] = ()
 

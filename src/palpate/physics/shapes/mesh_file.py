@@ -28,7 +28,7 @@ from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volum
 from palpate.physics.shapes.mesh_cells import duplicate_cells, merge_nodes, shortest_edge, split_cells
 from palpate.physics.shapes.mesh_groups import Group, MeshSource
 from palpate.physics.shapes.mesh_source import read_source
-from palpate.physics.shapes.meshing import MOST_ELEMENTS, FineMesh, boxes_meet
+from palpate.physics.shapes.meshing import INSIDE, MOST_ELEMENTS, FineMesh, boxes_meet
 from palpate.physics.shapes.naming import AND
 from palpate.physics.shapes.shape import Shape, require_size
 from palpate.physics.shapes.surface_checks import touching_shells
@@ -323,6 +323,12 @@ def _require_manifold(surface: Trimesh, source: str) -> None:
 def _bisect(mesh: Any, refinement: FineMesh) -> None:
     """Bisect the tetrahedra behind a part of a surface until their edges there are short enough."""
     name = refinement.surface
+    if name == INSIDE:
+        raise UsageError(
+            "A mesh from a file can't be made fine inside.",
+            why="Its elements are bisected behind a surface only.",
+            fix="Make it fine there in the program that it comes from.",
+        )
     pattern = "|".join(re.escape(part) for part in name.split(AND))
     for _ in range(40):
         marked = set()

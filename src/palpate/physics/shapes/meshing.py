@@ -22,6 +22,7 @@ from palpate.physics.shapes.naming import AND, GROUPS, members
 
 __all__ = [
     "GRADING",
+    "INSIDE",
     "MOST_ELEMENTS",
     "THREADS",
     "FineMesh",
@@ -34,6 +35,8 @@ __all__ = [
 
 GRADING = 0.4  # growth of the element size per distance from a fine surface
 THREADS = 1  # of Netgen; its own four gain nothing, and spin: ten times slower where another process works
+INSIDE = "inside"
+"""Name that a refinement gives in place of a surface, to make a box inside the body fine."""
 MOST_ELEMENTS = 400_000  # about half a million nodes of second order: beyond any direct solver on one machine
 Point = tuple[float, float, float]
 FLAT = 1e-5  # thickness over length below which a face counts as upright and plane
@@ -43,21 +46,22 @@ SHORTEST = 1e-5  # shortest edge over the body's length that is meshed as such; 
 
 @dataclass(frozen=True)
 class FineMesh:
-    """A part of a surface that shall have small elements.
+    """A part of a surface, or of the body's inside, that shall have small elements.
 
     Attributes
     ----------
     surface : str
-        Name of a surface of the body.
+        Name of a surface of the body, or ``"inside"`` for a box in its volume.
     element : float
         Length of an element's edge in m.
     lower, upper : tuple of three floats, optional
-        Corners in m of an upright box; the part of the surface within it becomes fine. Without a box, all of it.
+        Corners in m of an upright box; the part of the surface, or of the body, within it becomes fine. Without a box,
+        all of a surface.
 
     Raises
     ------
     UsageError
-        If the size is not positive, or the box is empty or has only one corner.
+        If the size is not positive, or the box is empty, has only one corner, or is not given for the inside.
     """
 
     surface: str
@@ -74,6 +78,12 @@ class FineMesh:
                 fix="Give both, or neither for the whole surface.",
             )
         if self.lower is None or self.upper is None:
+            if self.surface == INSIDE:
+                raise UsageError(
+                    "The refinement of the inside of a body has no box.",
+                    why="For all of it the shape's own `element` is there.",
+                    fix="Give lower and upper, two corners in m.",
+                )
             return
         lower = checks.triple("The lower corner of a refinement", self.lower, "m")
         upper = checks.triple("The upper corner of a refinement", self.upper, "m")
@@ -120,6 +130,8 @@ def points_on(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
     Any mesh of the body will do, a coarse one for example. Returns the points (n, 3) in m, and the area in m² that
     they stand for.
     """
+    if refinement.surface == INSIDE:
+        return _points_inside(mesh, refinement)
     if not members(refinement.surface, mesh.surfaces):
         return np.empty((0, 3)), 0.0
     corners = mesh.points[mesh.triangles_of(refinement.surface)]
@@ -134,6 +146,19 @@ def points_on(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
     centres = triangles.mean(axis=1)
     inside = boxes_meet(centres, centres, refinement)
     return centres[inside], float(_areas(triangles[inside]).sum())
+
+
+def _points_inside(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
+    """Points of a lattice in a box, and the area that would take as many elements as its volume (`require_budget`)."""
+    low, high = mesh.corners
+    lower, upper = np.maximum(refinement.lower, low), np.minimum(refinement.upper, high)
+    spans = np.maximum(upper - lower, 0.0)
+    require_budget([(float(np.prod(spans)), refinement.element)], [])
+    counts = np.maximum(np.ceil(spans / refinement.element).astype(int), 1)
+    # middles of cells: none lies on the body's surface, where a lattice would fight with the size of its elements
+    axes = [a + (np.arange(n) + 0.5) / n * (b - a) for a, b, n in zip(lower, upper, counts, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return points, 2.0 * GRADING * float(np.prod(spans)) / refinement.element
 
 
 def split_triangles(corners: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -219,7 +244,9 @@ def mesh_solid(
 
 def _is_on_rectangles(refinement: FineMesh, solid: Any) -> bool:
     """Return True where all refined faces of a solid are upright plane rectangles."""
-    return all(_is_rectangle(face) for face in solid.faces if refinement.is_on(face.name))
+    return refinement.surface != INSIDE and all(
+        _is_rectangle(face) for face in solid.faces if refinement.is_on(face.name)
+    )
 
 
 def _generate(geometry: Any, solid: Any, coarse: float, **options: Any) -> Any:

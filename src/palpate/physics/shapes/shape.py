@@ -19,7 +19,7 @@ import numpy as np
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.physics.shapes.mesh import BodyMesh, Face, body_mesh, faces_of
-from palpate.physics.shapes.meshing import FineMesh
+from palpate.physics.shapes.meshing import INSIDE, FineMesh
 from palpate.physics.shapes.naming import require_known
 
 if TYPE_CHECKING:
@@ -187,7 +187,8 @@ class Shape:
         if isinstance(refinements, FineMesh):
             return self._checked((refinements,))
         for refinement in refinements:
-            require_known("surface", refinement.surface, self.surfaces)
+            if refinement.surface != INSIDE:
+                require_known("surface", refinement.surface, self.surfaces)
         return tuple(refinements)
 
 

@@ -17,6 +17,7 @@ from palpate import checks
 from palpate.errors import UsageError
 from palpate.format import millimetres
 from palpate.physics.shapes.body_file import UNITS, require_unit
+from palpate.physics.shapes.divided_surface import divide_large
 from palpate.physics.shapes.shape import require_size
 from palpate.physics.shapes.surface_checks import require_closed
 from palpate.physics.shapes.surface_file import parse_surface
@@ -28,9 +29,13 @@ from palpate.tools.scanned_tool import ScannedTool
 __all__ = ["read_tool"]
 
 # of the inscribed radius: the lattice's spacing; how deep the distance is one, and over which depth it levels off
-SPACING, DEEP, LEVELS = 1 / 6, 0.375, 0.25
+SPACING, DEEP, LEVELS = 1 / 6, 0.55, 0.25
+SIDE = (
+    0.5  # of the inscribed radius: longer edges are halved, or normals at their ends would bend their middle
+)
 MARGIN = 3  # nodes of the lattice outside the tool on each side
 MOST = 120  # nodes along an axis
+MOST_TRIANGLES = 100_000
 LEVEL = 0.995  # of the largest inscribed radius on the tool's axis, at which its centre is
 AXES = {"+x": (0, 1), "-x": (0, -1), "+y": (1, 1), "-y": (1, -1), "+z": (2, 1), "-z": (2, -1)}
 
@@ -87,14 +92,15 @@ def read_tool(
     used = points[np.unique(triangles)]
     foremost = used[used[:, 2] <= used[:, 2].min() + 1e-6 * np.ptp(used, axis=0).max()].mean(axis=0)
     points, used = points - foremost, used - foremost
-    mesh = OrientedMesh.of(points, triangles)
-    measured = MeasuredDistance.of(mesh, float(np.ptp(used, axis=0).max()))
-    front, inscribed = _centre(measured, float(used[:, 2].max()))
+    height = float(used[:, 2].max())
+    inscribed = _centre(_measured(points, triangles), height)[1]
+    measured = _measured(*divide_large(points, triangles, SIDE * inscribed, MOST_TRIANGLES))
+    front, inscribed = _centre(measured, height)
     spacing = (
         inscribed * SPACING if spacing is None else checks.positive("The spacing of a tool", spacing, "m")
     )
     _require_spacing(path, spacing, inscribed, used)
-    points, used = points - [0, 0, front], used - [0, 0, front]
+    used = used - np.array([0.0, 0.0, front])
     return _on_lattice(name or Path(path).stem, measured, front, inscribed, spacing, used)
 
 
@@ -114,6 +120,11 @@ def _closed_surface(path: str, unit: str) -> tuple[np.ndarray, np.ndarray]:
         )
     require_closed(solid, path)
     return points, np.asarray(surface.triangles)
+
+
+def _measured(points: np.ndarray, triangles: np.ndarray) -> MeasuredDistance:
+    """Return the distance to the smooth surface behind a mesh, as for a probe as large as the tool."""
+    return MeasuredDistance.of(OrientedMesh.of(points, triangles), float(np.ptp(points, axis=0).max()))
 
 
 def _turned(points: np.ndarray, presses: str) -> np.ndarray:

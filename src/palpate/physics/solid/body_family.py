@@ -8,7 +8,7 @@ number of a material, for two evaluations of an integral. All members have the s
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from numbers import Real
@@ -41,7 +41,7 @@ THICKNESS = "thickness"
 UNITS = {
     **dict.fromkeys(("young", "bulk", "mu", "c10", "c01"), "Pa"),
     **dict.fromkeys(("poisson", "alpha"), ""),
-    **dict.fromkeys(("radius", THICKNESS), "m"),
+    **dict.fromkeys(("radius", THICKNESS, "x", "y", "z"), "m"),
 }
 # share of a property in the central difference of the energy: most laws are linear in it, so exact
 STEP = 1e-4
@@ -121,6 +121,20 @@ class Varied:
                 geometry=_layered_block(body, self.path).with_thickness(self.path.partition(".")[0], value),
             )
         materials = body.materials
+        region, steps = self._steps(materials)
+        materials[region] = _with_property(materials[region], steps, value, self.path)
+        return replace(body, material=materials)
+
+    def scale(self, body: Body, value: float) -> float:
+        """Return what a small step of this number of a material is measured by: its law's word, or the value's size."""
+        region, steps = self._steps(body.materials)
+        material: Any = body.materials[region]
+        for step in steps[:-1]:
+            material = getattr(material, step)
+        return float(getattr(material, "scales", {}).get(steps[-1], abs(value)) or 1.0)
+
+    def _steps(self, materials: Mapping[str, Any]) -> tuple[str, list[str]]:
+        """Return the region, and the steps from its material to the number."""
         region, _, rest = self.path.partition(".")
         if region not in materials and len(materials) == 1:
             region, rest = next(iter(materials)), self.path
@@ -130,8 +144,7 @@ class Varied:
                 why=f"Its regions are {', '.join(materials)}.",
                 fix=f'Write region and property, for example "{next(iter(materials))}.young".',
             )
-        materials[region] = _with_property(materials[region], rest.split("."), value, self.path)
-        return replace(body, material=materials)
+        return region, rest.split(".")
 
 
 def with_values(body: Body, varied: tuple[Varied, ...], values: tuple[float, ...]) -> Body:
@@ -463,7 +476,7 @@ class _EnergySlope:
 
     def __init__(self, solver: SolidSolver, body: Body, varied: Varied, value: float) -> None:
         model = solver.model
-        self._step = STEP * abs(value) or STEP
+        self._step = STEP * varied.scale(body, value)
         free = np.zeros(model.field.size, dtype=bool)
         ends = (varied.apply(body, value - self._step), varied.apply(body, value + self._step))
         self._low, self._high = (

@@ -12,29 +12,30 @@ from typing import Any
 
 import numpy as np
 
+from palpate.physics.interactions.pressing import PressingTool
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.shapes.meshing import FineMesh
 
 __all__ = ["FINER", "finer_problem"]
 
 FINER = 0.5  # size of the elements over the ordinary one
-REACH = 1.3  # half the side of the box of small elements around the ball's centre, over its radius
+REACH = 1.3  # half the side of the box of small elements around the place, over the ball's radius or the tool's reach
 # the same: sides of a box that are so near to another edge coincide with it, or slivers would lie between
 NEAR = 0.25
 
 
 def finer_problem(problem: Any, places: np.ndarray) -> Any:
-    """Return a problem of a body, or of a family, whose mesh is twice as fine around the ball at places (N, n ≥ 3).
+    """Return a problem of a body, or of a family, whose mesh is twice as fine around the ball or tool at places (N, n ≥ 3).
 
-    Elsewhere the mesh is as fine as that of `problem`, on which one ball acts.
+    Elsewhere the mesh is as fine as that of `problem`, on which one ball or tool acts.
     """
     base = getattr(problem, "base", problem)
-    probe = next(part for part in base.interactions if isinstance(part, SphereProbe))
+    probe = next(part for part in base.interactions if isinstance(part, PressingTool))
     wide = base.refinements
     size = FINER * min(part.element for part in wide if part.surface in {probe.meets, probe.touches})
-    half = REACH * probe.radius
+    half = REACH * _reach(probe)
     corners = [np.array([place - half, place + half]) for place in np.asarray(places, dtype=float)[:, :3]]
-    near = min(size, NEAR * probe.radius)
+    near = min(size, NEAR * probe.shape.size)
     levels = [np.array([*base.body.geometry.rest().corners])]
     levels += [np.array([part.lower, part.upper]) for part in wide if part.lower is not None]
     boxes = [
@@ -43,6 +44,13 @@ def finer_problem(problem: Any, places: np.ndarray) -> Any:
     ]
     finer = replace(base, fine=(*wide, *boxes))
     return finer if base is problem else replace(problem, base=finer)
+
+
+def _reach(probe: PressingTool) -> float:
+    """Return how far from its place a ball or a tool is in contact, in m, at most."""
+    if isinstance(probe, SphereProbe):
+        return probe.radius
+    return max(*probe.shape.half_widths(max(probe.depth)), probe.shape.size)
 
 
 def _join(boxes: list[np.ndarray]) -> list[np.ndarray]:

@@ -11,7 +11,6 @@ stationary in p at p = κ θ(F); between displacements of second and pressures o
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -70,9 +69,11 @@ def _rule_order(field: SolidField, material: Material) -> int:
     """Return the order to which a material's energy is integrated.
 
     Small strain: exact for products of two strains. Large strain: two orders more, as under a probe an element may turn
-    over in a corner while det F stays well above zero at the few points of the lower rule.
+    over in a corner while det F stays well above zero at the few points of the lower rule. A law that varies in space
+    asks for more by its `quadrature`.
     """
-    return 2 * field.order if material.kinematics == "large" else 2 * (field.order - 1)
+    order = 2 * field.order if material.kinematics == "large" else 2 * (field.order - 1)
+    return order + int(getattr(material, "quadrature", 0))
 
 
 def volume_rule(field: SolidField, material: Material) -> Any:
@@ -101,8 +102,7 @@ def _volumetric_density(material: Material, F: Any, pressure: Any) -> Any:
     """Return p θ(F) - p²/(2κ) in J/m³; at p = κ θ(F) it is ½ κ θ(F)²."""
     volumetric = material.volumetric
     assert volumetric is not None  # `Body` lets no other material go mixed
-    density = pressure * volumetric.measure(F)
-    return density if math.isinf(volumetric.modulus) else density - pressure**2 / (2 * volumetric.modulus)
+    return volumetric.mixed(F, pressure)
 
 
 def cauchy_stress(field: SolidField, region: str, material: Material, history: History | None) -> Any:

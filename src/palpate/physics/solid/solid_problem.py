@@ -17,6 +17,7 @@ from palpate.physics.apart import is_foreign, solve_apart
 from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.pads import advise_on_pad
+from palpate.physics.interactions.pressing import PressingTool
 from palpate.physics.interactions.rigid_limit import with_rigid_pad
 from palpate.physics.interactions.sphere import RIGID, SphereProbe
 from palpate.physics.interactions.surface_tool import SurfaceTool
@@ -168,7 +169,9 @@ class SolidProblem:
     def schema(self) -> tuple[Field, ...]:
         """Fields of each answer; a sweep asks for it."""
         edges = len(self.mesh.edges) if getattr(self.body.geometry, "drawn_apart", False) else 0
-        return solid_fields(len(self.mesh.points), self.ranges, stress=self.stress, edges=edges)
+        torque = any(isinstance(one, SurfaceTool) for one in self.interactions)
+        size = len(self.mesh.points)
+        return solid_fields(size, self.ranges, stress=self.stress, edges=edges, torque=torque)
 
     @property
     def design_name(self) -> str | None:
@@ -191,15 +194,17 @@ class SolidProblem:
 
     @property
     def symmetry(self) -> dict[str, Any] | None:
-        """Isometries of body, supports and touched surface as plain data; None but for one probe or glued pad."""
+        """Isometries of body, supports, touched surface and tool as plain data; None but for one tool or glued pad."""
         acting = self.interactions[0]
-        if len(self.interactions) > 1 or not isinstance(acting, SphereProbe | GluedPad):
+        if len(self.interactions) > 1 or not isinstance(acting, PressingTool | GluedPad):
             return None
         symmetry = symmetry_of(self.body, acting.touches)
         if isinstance(acting, GluedPad):
             symmetry = symmetry.part(
                 acting.keeps(matrix, symmetry.about, self.body.geometry) for matrix in symmetry.matrices
             )
+        if isinstance(acting, SurfaceTool):
+            symmetry = symmetry.part(acting.posed_tool.keeps(matrix) for matrix in symmetry.matrices)
         return symmetry.describe()
 
     @property

@@ -154,20 +154,21 @@ class SolidSolution:
 
     @property
     def force(self) -> np.ndarray:
-        """The response where every input is a length, shape (n,): for a probe the force that it feels, in N.
+        """The response to the inputs that are lengths, shape (n,): for a probe or tool the force that it feels, in N.
 
         Raises
         ------
         UsageError
-            If an input is no length.
+            If an input is neither a length nor an angle of a tool.
         """
-        if any(r.unit != "m" for r in self.ranges):
+        lengths = [r.unit == "m" for r in self.ranges]
+        if not all(lengths) and self.torque is None:
             raise UsageError(
                 "This solution has no force by itself.",
                 why=f"Its inputs are {', '.join(map(str, self.ranges))}; a force belongs to a length.",
                 fix="Read response: −∂U/∂input for each input.",
             )
-        return self.response
+        return self.response[lengths]
 
     def __str__(self) -> str:
         asked = ", ".join(

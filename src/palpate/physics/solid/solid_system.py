@@ -10,17 +10,20 @@ z = z_free + z_base + Σ qᵢ Lᵢ on given unknowns, by the envelope theorem
     Dᵢⱼ = ∂²Π/∂qᵢ∂qⱼ + Lᵢ · ∂²Π/∂z∂qⱼ + Lⱼ · ∂²Π/∂z∂qᵢ + Lᵢ · K Lⱼ,
 
 and the states follow the inputs with ∂z/∂qᵢ = Lᵢ - K⁻¹ Bᵢ. The derivatives of densities in their parameters are
-taken symbolically. A rigid tool's energy Π_t is one of X + u − q alone, so with the unknowns eᵢ of a displacement by 1
+taken symbolically. A rigid tool's energy Π_t is one of Rᵀ(X + u − p) alone, so with the unknowns eᵢ of a displacement
+by 1 along its place pᵢ
 
-    ∂Π_t/∂qᵢ = -eᵢ · ∂Π_t/∂z,    ∂²Π_t/∂z∂qᵢ = -K_t eᵢ,    ∂²Π_t/∂qᵢ∂qⱼ = eᵢ · K_t eⱼ,
+    ∂Π_t/∂pᵢ = -eᵢ · ∂Π_t/∂z,    ∂²Π_t/∂z∂pᵢ = -K_t eᵢ,    ∂²Π_t/∂pᵢ∂qⱼ = -eᵢ · ∂²Π_t/∂z∂qⱼ,
 
-and its torque follows in the same way from the unknowns of a rigid turn.
+and its torque, with it the derivatives by an angle, follow in the same way from the unknowns of a rigid turn. Second
+derivatives by angles are central differences of those first ones at a fixed state.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -33,6 +36,7 @@ __all__ = ["Inputs", "System", "is_accurate", "is_stable", "sparse_solver"]
 
 STEPS = 6  # Lanczos steps: each costs a back-substitution
 ACCURATE = 1e-6  # relative residual of a back-substitution
+ANGLE_STEP = 1e-5  # rad, of the differences by angles: errors are its square, and rounding over it
 SOLVERS = ("auto", "sparsecholesky", "pardiso", "umfpack")
 
 
@@ -189,17 +193,17 @@ class Inputs:
         state = self._at(z)
         explicit = [sum(form.Energy(state) for form in forms) for forms in self._first]
         for rows, part, form in self._shifted:
-            explicit[rows] = (-part.shifts @ self._slope(form, state)).tolist()  # type: ignore[operator]  # they have shifts
+            explicit[rows] = self._tool_gradient(part, form, z).tolist()
         return np.asarray(explicit - self.loads @ z + self.lifts @ reactions)
 
     def torque(self, z: np.ndarray, q: np.ndarray) -> np.ndarray | None:
         """Return the torque (3,) in N m on the first rigid tool about its place; None where there is none.
 
-        The state z (dof,) under inputs q (n,) must be the one under inspection.
+        The state is z (dof,) under inputs q (n,), which are set.
         """
         for rows, part, form in self._shifted:
             if part.turns is not None:
-                return np.asarray(part.turns(q[rows]) @ self._slope(form, self._at(z)))
+                return np.asarray(part.turns(z, q[rows]) @ self._slope(form, self._at(z)))
         return None
 
     def sensitivity(self, system: System, z: np.ndarray) -> np.ndarray:
@@ -255,6 +259,27 @@ class Inputs:
         form.Apply(state, result)
         return np.array(result.FV().NumPy())
 
+    def _tool_gradient(self, part: Attached, form: Any, z: np.ndarray) -> np.ndarray:
+        """Return ∂Π_t/∂q (3 + k,) of a rigid tool at its present inputs."""
+        slope = self._slope(form, self._at(z))
+        by_place = -part.shifts @ slope  # type: ignore[operator]  # it has shifts
+        if part.rates is None or part.turns is None:
+            return np.asarray(by_place)
+        q = np.array([parameter.Get() for parameter in part.parameters])
+        return np.append(by_place, -part.rates(q) @ (part.turns(z, q) @ slope))
+
+    def _by_angles(self, part: Attached, of: Callable[[], np.ndarray]) -> np.ndarray:
+        """Return the derivatives (k, …) by a tool's angles of what depends on its present inputs."""
+        rows = []
+        for parameter in part.parameters[3:]:
+            middle, ends = parameter.Get(), []
+            for step in (ANGLE_STEP, -ANGLE_STEP):
+                parameter.Set(middle + step)
+                ends.append(of())
+            parameter.Set(middle)
+            rows.append((ends[0] - ends[1]) / (2 * ANGLE_STEP))
+        return np.array(rows)
+
     def _coupling(self, z: np.ndarray) -> np.ndarray:
         """Return ∂²Π/∂z∂q without the lifts, shape (n, dof)."""
         state, result = self._at(z), self._field.state.vec.CreateVector()
@@ -265,10 +290,12 @@ class Inputs:
                 row += result.FV().NumPy()
         for rows, part, form in self._shifted:
             form.AssembleLinearization(state)
-            for row, shift in zip(coupling[rows], part.shifts, strict=True):  # type: ignore[arg-type]  # they have shifts
+            for row, shift in zip(coupling[rows], part.shifts, strict=False):  # type: ignore[arg-type]  # they have shifts
                 other = self._at(shift)
                 result.data = form.mat * other
                 row -= result.FV().NumPy()
+            if part.rates is not None:
+                coupling[rows][3:] += self._by_angles(part, partial(self._slope, form, state))
         return coupling
 
     def _input_hessian(self, z: np.ndarray, coupling: np.ndarray) -> np.ndarray:
@@ -276,8 +303,12 @@ class Inputs:
         state, own = self._at(z), np.zeros((self.size, self.size))
         for (i, j), forms in self._second.items():
             own[i, j] = own[j, i] = sum(form.Energy(state) for form in forms)
-        for rows, part, _ in self._shifted:
-            own[rows, rows] = -coupling[rows] @ part.shifts.T  # type: ignore[union-attr]  # they have shifts
+        for rows, part, form in self._shifted:
+            by_place = -coupling[rows] @ part.shifts.T  # type: ignore[union-attr]  # they have shifts
+            by_angles = np.empty((0, len(by_place)))
+            if part.rates is not None:
+                by_angles = self._by_angles(part, partial(self._tool_gradient, part, form, z))
+            own[rows, rows] = np.hstack([by_place, by_angles.T])
         return own
 
     def _lift_forces(self, system: System) -> np.ndarray:

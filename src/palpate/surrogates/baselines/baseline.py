@@ -108,6 +108,11 @@ class Baseline(ABC):
         """Return the kernels and their arguments, with scratch for one thread."""
 
     @property
+    def c_name(self) -> str:
+        """Name under which `c_source` defines its functions, by default its own."""
+        return self.name
+
+    @property
     def directions(self) -> np.ndarray:
         """Unit directions D (k, 3) of the felt coordinates; x, y and z by default."""
         return _SPACE

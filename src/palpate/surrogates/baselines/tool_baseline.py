@@ -82,15 +82,10 @@ class ToolBaseline(ContactBaseline):
         """The tool in a few words."""
         return f"a {self.posed_tool}"
 
-    def c_source(self) -> str:
-        """Refuse: a tool has no exported form yet.
-
-        Raises
-        ------
-        UsageError
-            Always.
-        """
-        raise _needs_ball(self, "be exported")
+    @property
+    def c_name(self) -> str:
+        """That of a ball: the surface that is kept makes the rest of it."""
+        return ContactBaseline.name
 
 
 def require_ball(baseline: Baseline, what: str) -> None:

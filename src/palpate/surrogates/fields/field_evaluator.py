@@ -51,6 +51,7 @@ class FieldEvaluator:
         arguments = (self._flat, self._z, self._place, np.ascontiguousarray(rows), self._profile, line)
         self._third: tuple[Any, ...] = (*arguments, *surrogate.moving_arguments())
         self._shape = (n - 3,)
+        self._shift = np.array(surrogate.shift)
         low = np.array([r.low for r in surrogate.inputs])
         self(low[:3], low[3:])  # compile now, not in the loop
         self.field()
@@ -64,7 +65,10 @@ class FieldEvaluator:
             If there are not three coordinates and p parameters.
         """
         position, parameters = place_at(position, parameters, self._shape)
-        return bool(coefficients_into(position, parameters, *self._first))
+        touches = bool(coefficients_into(position, parameters, *self._first))
+        if touches:
+            self._place[2:5] += self._shift
+        return touches
 
     def field(self) -> np.ndarray:
         """The field (nodes, components) at the last call's touch; the same array each time."""

@@ -139,6 +139,9 @@ class FieldSurrogate(Field):
         JSON-able.
     drawn : CarriedSurface, optional
         The body's own surface at full detail, which pictures show; by default they show the field's own triangles.
+    shift : tuple of three floats
+        Way in m from c to the centre of the ball whose depth counts: zero for a ball, the way from a tool's place.
+        `surface` is the body's less that way.
 
     Raises
     ------
@@ -164,6 +167,7 @@ class FieldSurrogate(Field):
     continuation: Continuation | None = None
     meta: Mapping[str, Any] = field(default_factory=dict)
     drawn: CarriedSurface | None = None
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         own_arrays(self, *_ARRAYS)
@@ -261,7 +265,12 @@ class FieldSurrogate(Field):
         """Nodes (nodes,) that the moving part moves, bool."""
         if self.local_mode is None:
             return np.zeros(len(self.points), dtype=np.bool_)
-        return self.local_mode.touches(self.surface, self.points)
+        return self._touches(self.points)
+
+    def _touches(self, points: np.ndarray) -> np.ndarray:
+        """Return which points (P, 3) in m the moving part moves, (P,) bool."""
+        assert self.local_mode is not None
+        return self.local_mode.touches(self.surface, points - np.array(self.shift))
 
     @cached_property
     def _fixed(self) -> tuple[np.ndarray, np.ndarray]:
@@ -344,7 +353,7 @@ class FieldSurrogate(Field):
         out = interpolation(values)
         if self.local_mode is None:
             return out
-        here, touched = self._moving_values(X, self.points), self.local_mode.touches(self.surface, points)
+        here, touched = self._moving_values(X, self.points), self._touches(points)
         out[:, touched] = (self._moving_values(X, points) + interpolation(values - here))[:, touched]
         return out
 

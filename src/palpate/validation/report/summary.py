@@ -138,6 +138,8 @@ def _facts(chapter: Chapter) -> Iterator[Fact]:
     if v.force is not None and v.force.p95 is not None:
         yield Fact(share(v.force.median), "force error at the median")
         yield Fact(share(v.force.p95), f"force error at most, for 95 of 100 solves: {felt(v.force.p95_jnd)}")
+    if v.torque is not None:
+        yield Fact(share(v.torque.p95), "torque error over force times the tool's size, for 95 of 100 solves")
     if v.whole_force_error is not None and v.mesh_part is not None:
         yield Fact(share(v.whole_force_error), f"force error with the mesh's, which is {share(v.mesh_part)}")
     if v.histories is not None:

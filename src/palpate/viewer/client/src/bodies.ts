@@ -13,6 +13,7 @@ import type { FieldInfo, Frame, Hello, Surface, TrustMap, Vec3 } from "./message
 import { Panel } from "./panel";
 import { PressHand } from "./press";
 import { get, parts } from "./resources";
+import { ToolShape } from "./tool_shape";
 import { PadView, PressView } from "./touch_view";
 import { element, fixed, input, measured } from "./units";
 import type { View } from "./view";
@@ -79,6 +80,7 @@ class LineBody implements Body {
 class PressedBody implements Body {
   readonly hand: PressHand;
   view: PressView | null = null;
+  private readonly shape: ToolShape;
   private surface: Surface | null = null;
   private fields: Field[] = [];
   private trust: TrustMap | null = null;
@@ -96,15 +98,15 @@ class PressedBody implements Body {
     connection: Link,
     panel: Panel,
   ) {
-    this.hand = new PressHand(canvas, connection, hello);
+    this.shape = new ToolShape(hello.tool, hello.radius);
+    this.hand = new PressHand(canvas, connection, hello, this.shape);
     [this.hand.wanted, this.hand.most] = Panel.depths(hello);
-    this.hand.radius = hello.radius;
     this.hand.deepened = (depth) => panel.depth(depth);
   }
 
   async open(): Promise<void> {
     const [surface, fields, trust] = await this.load(this.hello);
-    this.view = new PressView(this.canvas, surface, this.hello, WORDS.map(element));
+    this.view = new PressView(this.canvas, surface, this.hello, WORDS.map(element), this.shape);
     this.take(surface, fields, trust);
     this.hand.attach(this.view);
     for (const id of ["show-ghost", "show-mesh"]) input(id).addEventListener("input", () => this.draw());
@@ -117,7 +119,7 @@ class PressedBody implements Body {
       this.hello = hello;
       if (!same(surface.rest, this.surface!.rest) || !same(surface.triangles, this.surface!.triangles)) {
         const before = this.view!; // of another mesh
-        this.view = new PressView(this.canvas, surface, hello, WORDS.map(element), before);
+        this.view = new PressView(this.canvas, surface, hello, WORDS.map(element), this.shape, before);
         before.clear();
         this.hand.change(this.view);
         this.mark(this.places);
@@ -174,7 +176,9 @@ class PressedBody implements Body {
   show(frame: Frame): void {
     this.latest = frame;
     const { radius_parameter: own, radius } = this.hello;
-    if (own >= 0) this.hand.radius = frame.parameters[own] ?? radius;
+    if (own >= 0) this.shape.radius = frame.parameters[own] ?? radius;
+    this.shape.follow(frame.parameters);
+    this.hand.inForce = frame.parameters;
     this.draw();
   }
 
@@ -217,9 +221,9 @@ class PressedBody implements Body {
     const colours = this.trusting ? certainty(this.trust!) : info ? shares(info, values, this.shares) : plain(this.still.length);
     document.documentElement.dataset["summed"] = String(performance.now() - began); // ms
     const layers = { ghost: input("show-ghost").checked, mesh: input("show-mesh").checked };
-    view.touch(latest, this.hand.radius, moved, colours, layers);
+    view.touch(latest, this.shape, moved, colours, layers);
     const most = largest(info, values);
-    element("largest-note").textContent = this.trusting ? TRUST_NOTE : this.chosen === 0 && latest.grabbed ? remainder(latest.depth, most) : "";
+    element("largest-note").textContent = this.trusting ? TRUST_NOTE : this.chosen === 0 && latest.grabbed ? remainder(latest.depth, most, this.hello.tool !== null) : "";
   }
 }
 
@@ -256,12 +260,12 @@ class PadBody implements Body {
   }
 }
 
-/** Where the part of a press goes that does not move the body: the probe is a rigid ball with a soft pad. */
-function remainder(depth: number, most: number): string {
+/** Where the part of a press goes that does not move the body: the probe is a rigid ball or tool with a soft pad. */
+function remainder(depth: number, most: number, tool: boolean): string {
   const rest = 1000 * (depth - most);
   if (rest < 0.005) return "";
   const deep = fixed(1000 * depth, 2);
-  return `The probe is ${deep} mm deep: the soft pad around it takes the other ${fixed(rest, 2)} mm.`;
+  return `The ${tool ? "tool" : "probe"} is ${deep} mm deep: the soft pad around it takes the other ${fixed(rest, 2)} mm.`;
 }
 
 /** Deviations of a map in per cent; 0 where there is none. */

@@ -22,7 +22,7 @@ const SMALL_STEP = 0.004;
 
 export abstract class Hand {
   grabbed = false;
-  parameters = new Float32Array();
+  parameters: Float32Array = new Float32Array();
 
   protected pointer: number | null = null;
   protected padded = false; // the gamepad holds
@@ -46,6 +46,7 @@ export abstract class Hand {
     }
     canvas.addEventListener("keydown", (e) => {
       if (e.key === "Escape") this.release();
+      this.turned(e);
       if (this.pointer === null) this.key(e);
     });
     canvas.addEventListener("blur", () => this.pointer === null && !this.padded && this.release());
@@ -74,6 +75,10 @@ export abstract class Hand {
   protected abstract move(e: PointerEvent): void;
   protected abstract key(e: KeyboardEvent): void;
   protected abstract follow(pad: Pad, elapsed: number): void;
+  /** Hear a key that turns what presses, which works while a mouse or finger holds, too. */
+  protected turned(_: KeyboardEvent): void {
+    // most hands turn nothing
+  }
   /** Let the view follow: the hand takes hold or lets go. */
   protected abstract held(on: boolean): void;
 

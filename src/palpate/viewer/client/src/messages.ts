@@ -1,4 +1,4 @@
-// Generated from palpate/viewer/messages.py and part_messages.py; change it there, then
+// Generated from palpate/viewer/messages.py, part_messages.py and exam_messages.py; change it there, then
 //   python -m palpate.viewer.messages > src/palpate/viewer/client/src/messages.ts
 
 import { decode, encode } from "./wire";
@@ -6,7 +6,7 @@ import type { Layout } from "./wire";
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 8;
+export const PROTOCOL = 9;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -56,6 +56,16 @@ export interface Line {
   travel: Vec3[];
 }
 
+/** The tool that presses a body: its closed surface around its place, in the body's axes. */
+export interface DrawnTool {
+  words: string;
+  centre: Vec3;
+  points: number[];
+  normals: number[];
+  triangles: number[];
+  turns: [number, number, number];
+}
+
 /** A state in words and figures. */
 export interface StepInfo {
   label: string;
@@ -78,6 +88,37 @@ export interface MaterialInfo {
   poisson: string;
 }
 
+/** A size of a tool that can be chosen: its name in `StartWish`, what it is, and a text with its unit. */
+export interface SizeInfo {
+  name: string;
+  words: string;
+  value: string;
+}
+
+/** Something that can press a part: a ball, or a tool with sizes that suit the part. */
+export interface ToolInfo {
+  name: string;
+  about: string;
+  sizes: SizeInfo[];
+}
+
+/** A place that a person has marked on the skin, m, or one that practice shows. */
+export interface ExamMark {
+  number: number;
+  place: Vec3;
+  hardness: string;
+  depth: string;
+  answer: string;
+}
+
+/** An examination on this machine. */
+export interface FormerExam {
+  name: string;
+  at: string;
+  words: string;
+  ended: boolean;
+}
+
 /** A touchable body and its loop, once per connection, server to page. */
 export interface Hello {
   protocol: number;
@@ -88,6 +129,7 @@ export interface Hello {
   holds: boolean;
   radius: number;
   radius_parameter: number;
+  tool: DrawnTool | null;
   deepest: number;
   force_max: number;
   stiffness_max: number;
@@ -113,6 +155,7 @@ export interface Shown {
   fields: FieldInfo[];
   steps: StepInfo[];
   reach: number;
+  tool: DrawnTool | null;
 }
 
 /** An event in plain words, server to page. */
@@ -170,6 +213,7 @@ export interface PartFacts {
   whole: boolean;
   materials: MaterialInfo[];
   laws: string[];
+  tools: ToolInfo[];
   choices: Record<string, unknown>;
   notes: string[];
 }
@@ -183,6 +227,8 @@ export interface StartWish {
   radius: string;
   depth: string;
   trial: boolean;
+  tool: string;
+  sizes: Record<string, unknown>;
 }
 
 /** The wish that the numbers of the file are taken in another unit, page to server. */
@@ -200,6 +246,7 @@ export interface Answer {
   problem: string;
   fields: Record<string, unknown> | null;
   trial: boolean;
+  tool: DrawnTool | null;
 }
 
 /** The state of solving and learning, server to page. */
@@ -217,6 +264,30 @@ export interface LearningProgress {
   share: number;
   painted_area: number | null;
   trained_area: number | null;
+}
+
+/** The state of the page of an examination, server to page. */
+export interface ExamNews {
+  protocol: number;
+  title: string;
+  words: string;
+  stage: string;
+  notice: string;
+  elapsed: number;
+  marks: ExamMark[];
+  lumps: ExamMark[];
+  former: FormerExam[];
+  score: string;
+}
+
+/** The wish of a person who examines, page to server. */
+export interface ExamWish {
+  wish: string;
+  number: number;
+  place: Vec3;
+  hardness: string;
+  depth: string;
+  name: string;
 }
 
 export function isHello(message: { kind: string }): message is Hello & { kind: string } {
@@ -271,6 +342,14 @@ export function isLearningProgress(message: { kind: string }): message is Learni
   return message.kind === "LearningProgress";
 }
 
+export function isExamNews(message: { kind: string }): message is ExamNews & { kind: string } {
+  return message.kind === "ExamNews";
+}
+
+export function isExamWish(message: { kind: string }): message is ExamWish & { kind: string } {
+  return message.kind === "ExamWish";
+}
+
 export const FRAME = 1;
 
 /** One picture of the loop and of a touched body, server to page. */
@@ -283,7 +362,7 @@ export interface Frame {
   time: number;
   /** ms, page clock: `sent` of the last Hand that this page sent */
   echo: number;
-  /** m, the probe's centre, or the hand's offset from what it holds at rest */
+  /** m, the probe's centre or the tool's place, or the hand's offset from what it holds at rest */
   position: Vec3;
   /** N, on the hand */
   force: Vec3;

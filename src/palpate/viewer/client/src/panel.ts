@@ -212,9 +212,11 @@ class Timing {
 
 /** The line under the body's name: the probe, and the ranges that were trained. */
 function subtitle(hello: Hello): (Node | string)[] {
-  const probe = [`probe of radius ${measured(hello.radius, "m")}`, `trained to ${measured(hello.deepest, "m")} deep`];
+  // the words of a tool are long, and may be parted
+  const probe = hello.tool ? hello.tool.words : whole(`probe of radius ${measured(hello.radius, "m")}`);
+  const press = [probe, whole(`trained to ${measured(hello.deepest, "m")} deep`)];
   const ranges = hello.holds ? hello.inputs : hello.parameters;
-  const parts = [...(hello.holds ? [] : probe.map(whole)), ...trained(ranges)];
+  const parts = [...(hello.holds ? [] : press), ...trained(ranges)];
   const joined = parts.flatMap((part, i) => (i === 0 ? [part] : [", ", part]));
   return hello.holds ? ["trained on ", ...joined] : joined;
 }

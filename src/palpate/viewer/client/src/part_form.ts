@@ -1,19 +1,24 @@
-// The form beside a part that is set up: material and ball. Numbers are judged by the server when their field is left; a sentence
-// about one of them is looked at again with each key, so that it goes as soon as the number is right.
+// The form beside a part that is set up: material, and what presses. Numbers are judged by the server when their field is left; a
+// sentence about one of them is looked at again with each key, so that it goes as soon as the number is right.
 
-import type { MaterialInfo, PartFacts, StartWish } from "./messages";
+import type { DrawnTool, MaterialInfo, PartFacts, StartWish, ToolInfo } from "./messages";
 import { lengthOf } from "./lengths";
-import { element, input } from "./units";
+import { ToolShape } from "./tool_shape";
+import { element, input, worded } from "./units";
 
 const PAUSE = 250; // ms without a key until a number that was wrong is judged again
-const FIELDS = { young: "young", poisson: "poisson", radius: "ball-radius", depth: "ball-depth" } as const;
+const FIXED: Record<string, string> = { young: "young", poisson: "poisson", radius: "ball-radius", depth: "ball-depth" };
 const KINDS = { tissue: "tissues", silicone: "silicones", other: "others" } as const;
-
-type Field = keyof typeof FIELDS;
+const BALL = "ball";
 
 export class PartForm {
-  private readonly left = new Set<Field>(); // fields that a person has left, with what stands in them now
+  /** Hears of another tool, or another size of it, that can be drawn. */
+  reshaped: () => void = () => {};
+
+  private readonly left = new Set<string>(); // fields that a person has left, with what stands in them now
+  private readonly boxes = new Map(Object.entries(FIXED)); // id of the box of each field
   private waiting = 0;
+  private drawn: ToolShape;
 
   constructor(
     private readonly facts: PartFacts,
@@ -23,12 +28,21 @@ export class PartForm {
     this.list(choices.material);
     element<HTMLSelectElement>("law").replaceChildren(...facts.laws.map((law) => new Option(law, law)));
     element<HTMLSelectElement>("law").value = choices.law;
-    for (const field of names()) this.prepare(field, choices[field]);
+    for (const field of Object.keys(FIXED)) this.prepare(field, choices[field as "depth"]);
     element("material").addEventListener("input", () => {
       this.show();
       this.ask();
     });
+    this.drawn = new ToolShape(null, this.radius);
+    element<HTMLSelectElement>("tool").replaceChildren(...facts.tools.map(({ name }) => new Option(name, name)));
+    element<HTMLSelectElement>("tool").value = choices.tool;
+    element("tool").addEventListener("input", () => {
+      this.resize();
+      this.ask();
+    });
     this.show();
+    this.resize();
+    if (choices.tool !== BALL) this.ask(); // what it looks like
     this.draw();
   }
 
@@ -37,16 +51,17 @@ export class PartForm {
     const value = (id: string): string => element<HTMLInputElement | HTMLSelectElement>(id).value;
     const [young, poisson] = [value("young"), value("poisson")];
     const [radius, depth] = [value("ball-radius"), value("ball-depth")];
-    return { material: value("material"), law: value("law"), young, poisson, radius, depth, trial };
+    const sizes = Object.fromEntries(this.tool.sizes.map(({ name }) => [name, value(`size-${name}`)]));
+    return { material: value("material"), law: value("law"), young, poisson, radius, depth, trial, tool: this.tool.name, sizes };
   }
 
   /** Say beside the fields what is wrong with their numbers; with `all`, of those too in which a person still writes. */
   say(problems: Record<string, string>, all: boolean): void {
-    for (const field of names()) {
+    for (const [field, id] of this.boxes) {
       const problem = problems[field] ?? "";
       if (problem && !all && !this.left.has(field)) continue;
       if (all) this.left.add(field);
-      const [line, box] = [element(`${FIELDS[field]}-misfit`), input(FIELDS[field])];
+      const [line, box] = [element(`${id}-misfit`), input(id)];
       line.textContent = problem;
       line.hidden = !problem;
       box.setAttribute("aria-invalid", String(problem !== ""));
@@ -54,9 +69,27 @@ export class PartForm {
     if (all) document.querySelector<HTMLElement>("#panel input[aria-invalid=true]")?.focus();
   }
 
+  /** Take the tool that the server has made of the sizes. */
+  take(tool: DrawnTool | null): void {
+    if ((tool === null) !== (this.tool.name === BALL)) return; // of a choice that was changed meanwhile
+    this.drawn = new ToolShape(tool, this.radius);
+    this.reshaped();
+  }
+
+  /** What presses, as it is drawn. */
+  get shape(): ToolShape {
+    if (!this.drawn.tool) this.drawn.radius = this.radius;
+    return this.drawn;
+  }
+
   /** The radius of the ball, m; 0 where its text is none. */
-  get radius(): number {
+  private get radius(): number {
     return lengthOf(input("ball-radius").value);
+  }
+
+  private get tool(): ToolInfo {
+    const { value } = element<HTMLSelectElement>("tool");
+    return this.facts.tools.find(({ name }) => name === value) ?? this.facts.tools[0]!;
   }
 
   private list(chosen: string): void {
@@ -72,11 +105,38 @@ export class PartForm {
     select.value = chosen;
   }
 
-  private prepare(field: Field, text: string): void {
-    const [box, line] = [input(FIELDS[field]), document.createElement("p")];
+  /** The fields of the tool that is chosen, which begin with sizes that suit the part. */
+  private resize(): void {
+    const { tool } = this;
+    const ball = tool.name === BALL;
+    for (const part of document.querySelectorAll<HTMLElement>("#ball-section .ball")) {
+      part.hidden = !ball || (part.classList.contains("misfit") && !part.textContent);
+    }
+    element("tool-about").textContent = tool.about;
+    element("tool-about").hidden = ball;
+    for (const field of [...this.boxes.keys()]) if (!(field in FIXED)) this.boxes.delete(field);
+    element("tool-sizes").hidden = ball;
+    element("tool-sizes").replaceChildren(
+      ...tool.sizes.flatMap(({ name, words }) => {
+        const [label, box] = [worded("label", words) as HTMLLabelElement, document.createElement("input")];
+        [box.id, box.type, box.autocomplete, box.spellcheck] = [`size-${name}`, "text", "off", false];
+        label.htmlFor = box.id;
+        return [label, box];
+      }),
+    );
+    for (const { name, value } of tool.sizes) {
+      this.boxes.set(`size-${name}`, `size-${name}`);
+      this.prepare(`size-${name}`, value);
+    }
+    this.drawn = new ToolShape(null, ball ? this.radius : 0);
+    this.reshaped();
+  }
+
+  private prepare(field: string, text: string): void {
+    const [box, line] = [input(this.boxes.get(field)!), document.createElement("p")];
     box.value = box.defaultValue = text;
     line.id = `${box.id}-misfit`;
-    line.className = box.classList.contains("own") ? "misfit own" : "misfit";
+    line.className = ["misfit", ...["own", "ball"].filter((name) => box.classList.contains(name))].join(" ");
     line.hidden = true;
     line.setAttribute("role", "status");
     box.setAttribute("aria-describedby", line.id);
@@ -84,7 +144,7 @@ export class PartForm {
     box.addEventListener("input", () => {
       this.draw();
       if (box.getAttribute("aria-invalid") !== "true") this.left.delete(field);
-      else this.ask(PAUSE);
+      if (box.getAttribute("aria-invalid") === "true" || !(field in FIXED)) this.ask(PAUSE);
     });
     box.addEventListener("change", () => {
       this.left.add(field);
@@ -118,8 +178,4 @@ export class PartForm {
   private draw(): void {
     input("ball-radius").dataset["metres"] = String(this.radius); // for programs that drive the page
   }
-}
-
-function names(): Field[] {
-  return Object.keys(FIELDS) as Field[];
 }

@@ -16,6 +16,7 @@ import {
 import { Role } from "./messages";
 import type { PartFaces, Surface, Vec3 } from "./messages";
 import { SurfaceView } from "./surface_view";
+import type { ToolShape } from "./tool_shape";
 import { css } from "./units";
 
 const ROOM = 0.32; // of the part's size, above it, for the ball and its arrow
@@ -60,7 +61,7 @@ export class PartView extends SurfaceView {
     this.behind.renderOrder = 2; // after the surfaces, behind which it lies
     this.painted = this.border();
     this.scene.add(this.held, this.touched, this.asked, this.behind, this.painted);
-    this.probe.material.opacity = 0.35;
+    this.probe.material.opacity = 0.5;
     this.recolour();
     this.refresh();
   }
@@ -135,15 +136,35 @@ export class PartView extends SurfaceView {
     return mine.every((t) => this.roles[t] === first) ? first : -1;
   }
 
-  /** Show the ball where it would touch; null hides it. */
-  ball(at: Pointed | null, radius: number): void {
+  /** Show what presses where it would touch; null hides it. */
+  press(at: Pointed | null, shape: ToolShape): void {
     if (!at && !this.probe.visible) return;
-    this.probe.visible = at !== null && radius > 0;
-    if (at && radius > 0) {
-      this.probe.position.set(...at.point).addScaledVector(new Vector3(...at.normal), radius);
-      this.probe.scale.setScalar(radius);
+    this.probe.visible = at !== null && (shape.tool !== null || shape.radius > 0);
+    if (at && this.probe.visible) {
+      this.probe.position.set(...at.point).addScaledVector(new Vector3(...at.normal), shape.lift(at.normal));
+      this.probe.scale.setScalar(shape.size);
     }
     this.dirty = true;
+  }
+
+  /** The place in the middle of what is touched; null where nothing is. */
+  middle(): Pointed | null {
+    const touched = this.where((t) => this.roles[t] === Role.TOUCHED);
+    if (!touched.length) return null;
+    const mean = new Vector3();
+    let whole = 0;
+    for (const t of touched) {
+      mean.addScaledVector(new Vector3().fromArray(this.middles, 3 * t), this.areas[t]!);
+      whole += this.areas[t]!;
+    }
+    mean.divideScalar(whole);
+    const far = (t: number): number => new Vector3().fromArray(this.middles, 3 * t).distanceTo(mean);
+    const triangle = touched.reduce((best, t) => (far(t) < far(best) ? t : best));
+    const normal = this.normal(triangle);
+    const above = mean.sub(new Vector3().fromArray(this.middles, 3 * triangle));
+    const n = new Vector3(...normal);
+    const point = above.addScaledVector(n, -above.dot(n)).add(new Vector3().fromArray(this.middles, 3 * triangle));
+    return { triangle, point: point.toArray() as Vec3, normal };
   }
 
   /** Let the left button and one finger turn the view, or leave them to the brush. */
@@ -175,6 +196,8 @@ export class PartView extends SurfaceView {
     this.asked?.material.color.set(css("--warn"));
     this.behind?.material.color.set(css("--accent-2"));
     this.painted?.material.color.set(css("--ink"));
+    this.probe.material.color.set(css("--ink")); // it stands on what has its usual colour
+    this.probe.material.emissive.set(css("--ink")).multiplyScalar(0.1);
   }
 
   private refresh(): void {

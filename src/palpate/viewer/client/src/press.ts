@@ -5,7 +5,9 @@ import type { Link } from "./connection";
 import type { Pad } from "./gamepad";
 import { Hand } from "./hand";
 import type { Hello, Vec3 } from "./messages";
+import type { ToolShape } from "./tool_shape";
 import type { PressView, Spot } from "./touch_view";
+import { Turning } from "./turning";
 
 const SINK = 90; // ms, time constant with which the probe takes a new depth: a press and no blow
 const ARRIVED = 1e-4; // of the deepest press: nearer than this is there
@@ -25,7 +27,8 @@ export class PressHand extends Hand {
   /** m, of the rigid probe in the surface at rest */
   wanted = 0;
   most = 0;
-  radius = 0;
+  /** Further inputs of the latest picture. */
+  inForce: Float32Array = new Float32Array();
   /** Hears of a depth that wheel or keys have set. */
   deepened: (depth: number) => void = () => {};
 
@@ -34,13 +37,24 @@ export class PressHand extends Hand {
   private spot: Spot | null = null;
   private depth = 0;
   private force = NaN; // of a pen or a trigger, 0 … 1
+  private second: { id: number; x: number; y: number } | null = null; // finger that turns the tool
+  private readonly turning: Turning;
   private lastTick = 0;
 
-  constructor(canvas: HTMLCanvasElement, connection: Link, hello: Hello) {
+  constructor(
+    canvas: HTMLCanvasElement,
+    connection: Link,
+    hello: Hello,
+    private readonly shape: ToolShape,
+  ) {
     super(canvas, connection, hello);
+    this.turning = new Turning(hello);
     if (hello.device) return; // a device holds the hand
     canvas.addEventListener("pointerleave", () => this.pointer === null && !this.grabbed && this.hover(null));
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
+    for (const kind of ["pointerup", "pointercancel"] as const) {
+      canvas.addEventListener(kind, (e) => e.pointerId === this.second?.id && (this.second = null));
+    }
     canvas.addEventListener("keyup", (e) => e.key === " " && this.pointer === null && this.release());
   }
 
@@ -71,6 +85,7 @@ export class PressHand extends Hand {
   }
 
   override release(): void {
+    this.second = null;
     this.force = NaN;
     super.release();
   }
@@ -79,20 +94,22 @@ export class PressHand extends Hand {
     document.documentElement.dataset["sinking"] = String(on);
     if (!this.view) return;
     this.view.turnable = !on;
-    if (on) this.view.point(null, this.radius);
+    if (on) this.view.point(null, this.shape);
   }
 
-  /** The probe's centre. */
+  /** The ball's centre, or the tool's place. */
   protected override wish(): Vec3 {
     const { hello, spot } = this;
     if (!spot) return [0, 0, 0];
-    const lift = this.radius - this.depth;
+    const lift = this.shape.lift(spot.normal) - this.depth;
     return [0, 1, 2].map((k) => spot.point[k]! + lift * spot.normal[k]! - hello.centre[k]!) as Vec3;
   }
 
   protected override down(e: PointerEvent): void {
     if (this.grabbed) {
-      if (e.pointerId !== this.pointer) this.release(); // a second finger turns and zooms
+      if (e.pointerId === this.pointer || this.second) return;
+      if (this.turning.possible && this.pointer !== null) this.second = { id: e.pointerId, x: e.offsetX, y: e.offsetY };
+      else this.release(); // a second finger turns the view and zooms
       return;
     }
     if (!this.view || e.button !== 0 || this.pointer !== null) return;
@@ -106,7 +123,10 @@ export class PressHand extends Hand {
 
   protected override move(e: PointerEvent): void {
     if (!this.view) return;
-    if (e.pointerId === this.pointer) {
+    if (this.second?.id === e.pointerId) {
+      this.turn(this.turning.byFinger(e.offsetX - this.second.x, e.offsetY - this.second.y, this.now));
+      [this.second.x, this.second.y] = [e.offsetX, e.offsetY];
+    } else if (e.pointerId === this.pointer) {
       this.slide(e.offsetX, e.offsetY);
       if (e.pointerType === "pen" && e.pressure > 0) this.force = e.pressure;
     } else if (e.pointerType !== "touch" && !this.grabbed && e.buttons === 0) {
@@ -114,6 +134,12 @@ export class PressHand extends Hand {
       if (spot?.touchable) this.at = [e.offsetX, e.offsetY];
       this.hover(spot);
     }
+  }
+
+  protected override turned(e: KeyboardEvent): void {
+    if (e.ctrlKey || e.metaKey || e.altKey) return;
+    const parameters = this.turning.byKey(e.key, e.shiftKey, this.now);
+    if (parameters) this.turn(parameters);
   }
 
   protected override key(e: KeyboardEvent): void {
@@ -134,6 +160,7 @@ export class PressHand extends Hand {
     if (!this.view) return;
     const [right, up] = pad.left;
     if (right !== 0 || up !== 0) this.walk([right, -up], SPEED * elapsed);
+    if (this.turning.possible && pad.right.some((way) => way !== 0)) this.turn(this.turning.byStick(pad.right, elapsed, this.now));
     if (!pad.hold && !pad.trigger) {
       if (this.padded) this.release();
       return;
@@ -145,6 +172,17 @@ export class PressHand extends Hand {
       this.press(spot);
     }
     this.force = pad.hold ? NaN : pad.trigger;
+  }
+
+  /** The further inputs that are wanted, or else those in force. */
+  private get now(): Float32Array {
+    return this.parameters.length ? this.parameters : this.inForce;
+  }
+
+  private turn(parameters: Float32Array): void {
+    this.parameters = parameters;
+    this.shape.follow(parameters);
+    this.send();
   }
 
   private press(spot: Spot): void {
@@ -163,7 +201,7 @@ export class PressHand extends Hand {
   private hover(spot: Spot | null): void {
     const on = spot?.touchable ? spot : null;
     this.canvas.dataset["cursor"] = on ? "grab" : "";
-    this.view?.point(on, this.radius);
+    this.view?.point(on, this.shape);
   }
 
   private wheel(e: WheelEvent): void {

@@ -1,4 +1,4 @@
-// The form on which a part is set up: picks on its surface, material, ball, and the start.
+// The form on which a part is set up: picks on its surface, material, tool, and the start.
 //
 // No role is chosen at first, so that a click changes nothing by mistake: it asks what the place shall be. With a role, a click gives
 // it; nothing is taken back by a second click, for which there is *neither*, and undo.
@@ -44,6 +44,8 @@ export class Setup {
     if (facts.faces.length < 2 && !facts.whole) this.tool = "patch"; // one smooth face is all of the part
     this.describe();
     this.form = new PartForm(facts, judge);
+    this.form.reshaped = () => this.rest();
+    this.rest();
     element("start").addEventListener("click", () => this.begin());
     this.buttons();
     this.pointers();
@@ -52,7 +54,8 @@ export class Setup {
   }
 
   /** Say what does not fit, of the whole and of single fields; nothing where all does. */
-  answer({ problem, fields, trial }: Answer): void {
+  answer({ problem, fields, trial, tool }: Answer): void {
+    if (trial && fields && !Object.keys(fields).length) this.form.take(tool);
     if (fields) this.form.say(fields as Record<string, string>, !trial);
     if (trial) return;
     this.starting = false;
@@ -281,12 +284,19 @@ export class Setup {
       const at = this.pressed && !this.pressed.painting ? null : view.pointed(e.offsetX, e.offsetY);
       if (this.pressed?.painting && e.pointerId === this.pressed.id && at) this.paint(at);
       canvas.dataset["cursor"] = at ? "pick" : "";
-      if (e.pointerType !== "touch") view.ball(this.tool === "brush" ? null : at, this.form.radius);
+      if (e.pointerType !== "touch") view.press(this.tool === "brush" ? null : at, this.form.shape);
     });
-    canvas.addEventListener("pointerleave", () => view.ball(null, 0));
+    canvas.addEventListener("pointerleave", () => this.rest());
     for (const kind of ["pointerup", "pointercancel"] as const) {
       canvas.addEventListener(kind, (e) => this.up(e, kind === "pointerup"));
     }
+  }
+
+  /** Where nobody points, a tool is seen on the middle of what it touches; a ball is none that has to be seen. */
+  private rest(): void {
+    const { shape } = this.form;
+    this.view.shape(shape);
+    this.view.press(shape.tool ? this.view.middle() : null, shape);
   }
 
   private down(e: PointerEvent): void {

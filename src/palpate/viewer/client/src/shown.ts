@@ -6,6 +6,7 @@ import { decodeStep, decodeSurface, isShown, PROTOCOL } from "./messages";
 import type { FieldInfo, Shown, Step } from "./messages";
 import { mode, watch } from "./skeleton";
 import { SurfaceView } from "./surface_view";
+import { ToolShape } from "./tool_shape";
 import { element, input, measured, worded } from "./units";
 
 const KEPT = 64; // states kept in memory
@@ -18,6 +19,7 @@ const data = document.documentElement.dataset;
 
 let facts: Shown;
 let view: SurfaceView;
+let shape: ToolShape;
 let current: Step | null = null;
 let field = 0;
 let wanted = 0;
@@ -50,7 +52,9 @@ async function open(): Promise<void> {
   });
   element("states").hidden = facts.steps.length < 2;
   input("state").max = String(facts.steps.length - 1);
+  shape = new ToolShape(facts.tool, 0);
   view = new SurfaceView(canvas, surface, ["title", "tools", "scale-notes", "legend"].map(element));
+  view.shape(shape);
   view.neutral(nothing(facts.fields[field]!));
   listen();
   requestAnimationFrame(picture);
@@ -91,7 +95,8 @@ function draw(): void {
   const info = facts.fields[field]!;
   const values = valuesOf(current, field);
   const factor = FACTORS[input("factor").valueAsNumber]!;
-  const probe = current.probed && input("show-probe").checked ? current : null;
+  const probe = current.probed && input("show-probe").checked ? { centre: current.centre, shape } : null;
+  shape.radius = current.radius;
   const layers = { ghost: input("show-ghost").checked, mesh: input("show-mesh").checked };
   view.deform(current.displacement, factor, shares(info, values), probe, layers);
   legend(info);

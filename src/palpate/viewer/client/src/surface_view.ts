@@ -25,6 +25,7 @@ import {
 import { palette } from "./colour";
 import { normalsInto } from "./mesh";
 import type { Surface, Vec3 } from "./messages";
+import type { ToolShape } from "./tool_shape";
 import { css, round125 } from "./units";
 import { View } from "./view";
 
@@ -46,10 +47,10 @@ export interface Layers {
   mesh: boolean;
 }
 
-/** A rigid sphere, m; null where there is none to draw. */
+/** A rigid ball or tool at its place, m; null where there is none to draw. */
 export interface Probe {
   centre: Vec3;
-  radius: number;
+  shape: ToolShape;
 }
 
 export class SurfaceView extends View {
@@ -67,7 +68,7 @@ export class SurfaceView extends View {
   protected readonly still: Mesh<BufferGeometry, MeshBasicMaterial>; // the surface at rest
   private readonly fixed: LineSegments<BufferGeometry, LineBasicMaterial>;
   private readonly floor: LineSegments<BufferGeometry, LineBasicMaterial>;
-  protected readonly probe: Mesh<SphereGeometry, MeshLambertMaterial>;
+  protected readonly probe: Mesh<BufferGeometry, MeshLambertMaterial>;
   private colours = numbers(palette());
   private readonly unknown = new Color();
   private readonly untouched = new Color();
@@ -150,10 +151,18 @@ export class SurfaceView extends View {
     this.probe.visible = probe !== null;
     if (probe) {
       this.probe.position.set(...probe.centre);
-      this.probe.scale.setScalar(Math.max(probe.radius, 1e-9));
+      this.probe.scale.setScalar(probe.shape.size);
+      this.probe.quaternion.copy(probe.shape.turned);
     }
     this.wires.visible = layers.mesh;
     this.ghost.visible = this.still.visible = layers.ghost;
+    this.dirty = true;
+  }
+
+  /** Draw what presses in its shape from now on. */
+  shape(shape: ToolShape): void {
+    this.probe.geometry.dispose();
+    this.probe.geometry = shape.geometry();
     this.dirty = true;
   }
 

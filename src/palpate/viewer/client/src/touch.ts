@@ -40,10 +40,12 @@ export interface Joint {
   before?(): View | null;
   /** Hears of each picture. */
   seen?(frame: Frame): void;
+  /** Hears of the view, once it has been asked to draw, picture by picture. */
+  drawn?(view: View): void;
 }
 
 /** Show a touched body. */
-export function touch({ connect, renewed = () => {}, before = () => null, seen = () => {} }: Joint): Touched {
+export function touch({ connect, renewed = () => {}, before = () => null, seen = () => {}, drawn: placed = () => {} }: Joint): Touched {
   const panel = new Panel();
   let hello: Hello | null = null;
   let body: Body | null = null;
@@ -175,6 +177,7 @@ export function touch({ connect, renewed = () => {}, before = () => null, seen =
       body.place();
       panel.sharpness(body.view.sharpness);
     }
+    if (body?.view) placed(body.view);
   }
 
   watch(

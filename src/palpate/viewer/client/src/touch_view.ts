@@ -1,12 +1,13 @@
 // A solid body under a hand: pressed by a free probe, or held by a pad; the force as an arrow.
 
-import { CylinderGeometry, DoubleSide, Mesh, MeshLambertMaterial, Plane, SphereGeometry, Vector3 } from "three";
-import type { Vector2 } from "three";
+import { CylinderGeometry, DoubleSide, Mesh, MeshLambertMaterial, Plane, Vector3 } from "three";
+import type { BufferGeometry, Vector2 } from "three";
 import { Arrow } from "./arrow";
 import { normalsInto, Target } from "./mesh";
 import type { Frame, Hello, Surface, Vec3 } from "./messages";
 import { SurfaceView } from "./surface_view";
 import type { Layers } from "./surface_view";
+import type { ToolShape } from "./tool_shape";
 import { css } from "./units";
 
 const LONG = 0.22; // of the body's size: the arrow at the largest trained force
@@ -20,11 +21,11 @@ export interface Spot {
 
 export class PressView extends SurfaceView {
   readonly arrow: Arrow;
-  readonly grip = new Vector3(); // the probe's centre
+  readonly grip = new Vector3(); // the middle of what presses
 
   private target: Target | null = null; // made when the pointer first comes
   private readonly resting: Float32Array; // normals of the points at rest
-  private readonly hover: Mesh<SphereGeometry, MeshLambertMaterial>;
+  private readonly hover: Mesh<BufferGeometry, MeshLambertMaterial>;
   private nearby: Vector3 | null = null; // m, of the device's centre
 
   constructor(
@@ -32,41 +33,44 @@ export class PressView extends SurfaceView {
     surface: Surface,
     private readonly hello: Hello,
     words: readonly Element[],
+    shape: ToolShape,
     before: PressView | null = null,
   ) {
     super(canvas, surface, words, before);
     this.arrow = new Arrow(LONG * this.across(), Math.max(hello.force_max, 1e-9), hello.radius);
     this.hover = new Mesh(
-      new SphereGeometry(1, 48, 32),
+      shape.geometry(),
       new MeshLambertMaterial({ transparent: true, opacity: 0.28, depthWrite: false }),
     );
     this.hover.visible = this.arrow.group.visible = false;
+    this.shape(shape);
     this.probe.material.opacity = 0.45; // the dent is seen through it
     this.still.material.side = DoubleSide;
     this.resting = new Float32Array(surface.rest.length);
     normalsInto(this.resting, surface.rest, this.triangles);
     this.scene.add(this.hover, this.arrow.group);
-    this.roof = 2 * hello.radius + LONG * this.across(); // the probe and its arrow
+    this.roof = Math.max(2 * hello.radius, shape.height) + LONG * this.across(); // what presses, and its arrow
     this.recolour();
   }
 
   /** Take over one picture: displacement of each point, colours by each point's share of the scale. */
-  touch(frame: Frame, radius: number, moved: Float32Array, shares: ArrayLike<number>, layers: Layers): void {
+  touch(frame: Frame, shape: ToolShape, moved: Float32Array, shares: ArrayLike<number>, layers: Layers): void {
     const seen = frame.grabbed || this.hello.device !== ""; // a device's hand is seen in the air, too
-    this.deform(moved, 1, shares, seen ? { centre: frame.position, radius } : null, layers);
-    this.grip.set(...frame.position);
-    this.arrow.resize(radius);
+    this.deform(moved, 1, shares, seen ? { centre: frame.position, shape } : null, layers);
+    this.grip.set(...frame.position).add(shape.middle);
+    this.arrow.resize(shape.radius);
     this.arrow.update(this.grip, seen ? frame.force : [0, 0, 0]);
     if (seen) this.hover.visible = false;
   }
 
   /** Draw where a press would begin; null draws nothing. */
-  point(spot: Spot | null, radius: number): void {
+  point(spot: Spot | null, shape: ToolShape): void {
     if (!spot && !this.hover.visible) return;
     this.hover.visible = spot !== null;
     if (spot) {
-      this.hover.position.set(...spot.point).addScaledVector(new Vector3(...spot.normal), radius);
-      this.hover.scale.setScalar(radius);
+      this.hover.position.set(...spot.point).addScaledVector(new Vector3(...spot.normal), shape.lift(spot.normal));
+      this.hover.scale.setScalar(shape.size);
+      this.hover.quaternion.copy(shape.turned);
     }
     this.dirty = true;
   }

@@ -1,0 +1,188 @@
+"""`palpate experiment`: plans of experiments with people, their outlook, live sittings, and their analysis."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from palpate.cli.command_names import CommandGroup
+from palpate.cli.console import Console
+from palpate.cli.number_options import count_option
+from palpate.cli.table_options import Json
+from palpate.errors import AccuracyError, DeviceError, UsageError
+
+if TYPE_CHECKING:
+    from palpate.experiments.experiment_pages import SittingPage
+
+__all__ = ["experiment_app"]
+
+experiment_app = typer.Typer(
+    cls=CommandGroup,
+    help="Experiments with people: plan, simulate, run, analyse. Tried on simulated observers only.",
+    no_args_is_help=True,
+)
+
+PlanFile = Annotated[Path, typer.Argument(help="Plan, as [bold]palpate experiment plan[/] writes it.")]
+Who = Annotated[str, typer.Argument(help="Label of the participant, such as sub-01; never a name.")]
+SIMULATED = "Everything here was tried on simulated observers only, never on people."
+
+
+@experiment_app.command("plan")
+def write_plan(
+    bodies: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Model files (.palpate) of the bodies, the reference first."),
+    ] = None,
+    kind: Annotated[
+        str,
+        typer.Option(help="discrimination, full-model, odd-one-out, detection or rating."),
+    ] = "discrimination",
+    name: Annotated[str, typer.Option(help="Name of the experiment: letters and digits.")] = "stiffness",
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="File to write. Default: NAME.toml.")
+    ] = None,
+    show: Annotated[bool, typer.Option("--print", help="Print the plan instead of writing a file.")] = False,
+) -> None:
+    """Write a commented plan for bodies that were learnt. It is a text: edit it, then simulate it."""
+    from palpate.experiments.ready_plans import ready_plan
+    from palpate.files import write_file
+
+    text = ready_plan(kind, name, bodies or ([Path("body.palpate"), Path("other.palpate")]))
+    if show:
+        typer.echo(text)
+        return
+    file = out or Path(f"{name}.toml")
+    if file.exists():
+        raise UsageError(
+            f"{file} is there already.",
+            why="A plan is never overwritten.",
+            fix="Give another --name or --out.",
+        )
+    write_file(file, text)
+    Console().result(f"{file}: edit it, then `palpate experiment simulate {file}`.", {})
+
+
+@experiment_app.command()
+def simulate(
+    plan: PlanFile,
+    people: Annotated[
+        int, count_option("--people", least=50, most=20000, help="Number of simulated people.")
+    ] = 1000,
+    seed: Annotated[int, count_option("--seed", least=0, help="Seed of the simulation.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Try a plan on simulated people: coverage, bias, and power. The exit code is 1 if its power is missed."""
+    from palpate.experiments.outlook import foresee
+    from palpate.experiments.plan import read_plan
+
+    console = Console(as_json)
+    read = read_plan(plan)
+    if read.question == "rating":
+        raise UsageError(
+            "Ratings can't be simulated.", why="No function says how people rate.", fix="Run a pilot instead."
+        )
+    outlook = foresee(read, people, seed, console.say)
+    console.result(f"{outlook}\n{SIMULATED}", outlook.as_dict())
+    if not outlook.reaches:
+        wanted, enough = read.wanted, outlook.enough
+        raise AccuracyError(
+            f"{wanted.people} people show equivalence with a power of {outlook.power[wanted.people]:.0%}, "
+            f"not {wanted.power:.0%}.",
+            why=f"One person's JND has a scatter of {outlook.person.scatter:.0%} after "
+            f"{outlook.person.trials} trials, and people differ.",
+            fix=f"Plan for {enough} people, more trials, or a wider margin."
+            if enough
+            else "Not even 64 people reach it: give more trials, or a wider margin.",
+        )
+
+
+@experiment_app.command("run")
+def run_one(
+    plan: PlanFile,
+    participant: Who,
+    run: Annotated[int, count_option("--run", least=1, most=99, help="Number of this person's sitting.")] = 1,
+    device: Annotated[
+        str | None, typer.Option(help="Another device than the plan's; see [bold]palpate devices[/].")
+    ] = None,
+    port: Annotated[
+        int, count_option("--port", least=0, most=65534, help="Port of the participant's page.")
+    ] = 8080,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open both pages in a web browser.")
+    ] = True,
+    token: Annotated[
+        bool, typer.Option("--token/--no-token", help="Open the pages only to who has their whole address.")
+    ] = True,
+    age_band: Annotated[str, typer.Option(help="Band of ten years, such as 20-29.")] = "n/a",
+    hand: Annotated[str, typer.Option(help="Hand that touches: left, right or both.")] = "n/a",
+    expertise: Annotated[str, typer.Option(help="Experience, as you define it.")] = "n/a",
+) -> None:
+    """Run a participant's sitting, on a page of theirs and a control page; one that was interrupted goes on."""
+    from palpate.experiments.live import run_sitting
+    from palpate.experiments.study_folder import Participant
+    from palpate.viewer.web_server import way_in
+
+    console = Console()
+    with contextlib.ExitStack() as ways:
+
+        def ready(hers: SittingPage, control: SittingPage) -> None:
+            console.say(f"participant: {hers.url}")
+            console.say(f"control:     {control.url}")
+            console.say("Ctrl-C ends it; what was answered is kept.")
+            if browser and sys.stdout.isatty():
+                for page in (control, hers):
+                    webbrowser.open(ways.enter_context(way_in(page)))
+
+        try:
+            conductor = run_sitting(
+                plan,
+                Participant(participant, age_band, hand, expertise),
+                run=run,
+                device=device,
+                port=port,
+                token=token,
+                say=console.say,
+                on_ready=ready,
+            )
+        except KeyboardInterrupt:
+            console.say("Ended. Run the same command again: the sitting goes on.")
+            return
+    done, total = conductor.sitting.done, conductor.sitting.total
+    if conductor.phase == "failed":
+        raise DeviceError(
+            f"The sitting stopped after {done} of {total} trials.",
+            why=conductor.said,
+            fix="See to the device, then run the same command again: the sitting goes on.",
+        )
+    console.result(f"{done} of {total} trials are in {conductor.files.table}", {"done": done, "total": total})
+
+
+@experiment_app.command("analyse")
+def analyse_folder(plan: PlanFile, as_json: Json = False) -> None:
+    """Analyse all sittings of a plan: each person's function, the group, and equivalence."""
+    from palpate.experiments.analysis import analyse
+    from palpate.experiments.study_folder import StudyFolder
+
+    analysis = analyse(StudyFolder.beside(plan))
+    Console(as_json).result(str(analysis), analysis.as_dict())
+
+
+@experiment_app.command()
+def forget(
+    plan: PlanFile,
+    participant: Who,
+    yes: Annotated[bool, typer.Option("--yes", help="Don't ask.")] = False,
+) -> None:
+    """Remove a person's data: answers, recordings, notes, and the row in the table of participants."""
+    from palpate.experiments.study_folder import Participant, StudyFolder
+
+    who = Participant(participant)
+    if not yes and not typer.confirm(f"Remove all data of {who.label}? They can't be brought back."):
+        raise typer.Exit(1)
+    count = StudyFolder.beside(plan).forget(who)
+    Console().result(f"{count} files of {who.label} are removed.", {})

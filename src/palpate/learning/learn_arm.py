@@ -1,0 +1,39 @@
+"""The torque on a tool of fixed orientation, learnt from solves as the torque per newton of force, in m."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.learning.arrays.fit import fit
+from palpate.learning.arrays.fitted import Fitted
+from palpate.options import FitOptions
+from palpate.surrogates.learnt_torque import turn_inputs
+from palpate.units import Quantity, Range
+
+__all__ = ["ARM_OUTPUTS", "learn_arm"]
+
+ARM_OUTPUTS = tuple(Quantity(f"arm_{axis}", "m") for axis in "xyz")
+FAINT = 0.01  # of the largest force: below it an arm is mostly the mesh's error
+FEWEST = 20  # solves that a fit takes
+CLEAN = 1e-6  # of the largest arm: a component that is smaller everywhere is zero by symmetry
+
+
+def learn_arm(data: Dataset, inputs: tuple[Range, ...], options: FitOptions) -> Fitted | None:
+    """Return the arm learnt from converged solves; None where they tell no torque, are too few, or turn the tool.
+
+    `inputs` are those of the energy beside which it is learnt.
+    """
+    if "torque" not in data or turn_inputs(inputs):
+        return None
+    force, torque = data.response[:, :3], data["torque"]
+    size = np.linalg.norm(force, axis=1)
+    rows = (size > FAINT * size.max(initial=0.0)) & np.isfinite(torque).all(axis=1)
+    if rows.sum() < FEWEST:
+        return None
+    arm = torque[rows] / size[rows, None]
+    largest = np.abs(arm).max(axis=0)
+    arm[:, largest <= CLEAN * largest.max()] = 0.0
+    if not np.ptp(arm, axis=0).any():
+        return None
+    return fit(data.X[rows], arm, list(inputs), list(ARM_OUTPUTS), options=options)

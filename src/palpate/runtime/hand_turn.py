@@ -1,0 +1,212 @@
+"""The turn of the hand: from what a device says of its handle to the inputs that turn a tool, and back as a torque.
+
+A tool turns with the hand from where it was when the hand took hold. So it never leaps, and a hand that lets go and
+takes hold again turns it on, as a clutch does. A turn that the tool was not trained for stays at the border of its
+range.
+
+    R_tool = R_hand R_hand(at hold)ᵀ R_tool(at hold)        w = log R_tool, beside the tool's fixed rotation
+
+Where two components of w are inputs, w is the rotation about an axis in the body's x–y plane that brings the tool's own
+axis where R_tool does.
+
+Torques are those of a body that is drawn 1/scale times as large, as the force's arms are: τ/scale on the hand. Four
+laws hold on every tick as they do for the force, see `safety`: limit, slew, ramp, and zero at once where the gate is
+closed. A turn through an angle θ counts as a way of 50 mm · θ, and so the passivity controller and the watch on
+oscillations are those of the force.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from palpate.devices.device import Axes
+from palpate.runtime.oscillation import OscillationWatch
+from palpate.runtime.passivity import PassivityController
+from palpate.runtime.safety import Limits, Safety
+from palpate.units import Range
+
+__all__ = ["HandTurn", "TorqueOnHand", "rotation_of"]
+
+LEVER = 0.05  # m from the handle's axis to the fingers: a turn counts as the way there
+_NORM = 0.01  # by how much the length of a quaternion may differ from 1
+_FASTEST = 50.0  # rad/s: no wrist turns faster, and no two samples of hardware are farther apart
+_SHORTEST = 1e-3  # s between two samples
+_STILL = [0.0, 0.0, 0.0]
+_PATIENCE = 3  # impossible orientations in a row that are a fault
+_UPRIGHT = np.array(
+    [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+)  # hand's axes to those of a body with z up
+_TURNS = ("tip_rx", "tip_ry", "tip_rz")
+
+
+def rotation_of(quaternion: np.ndarray, matrix: np.ndarray) -> bool:
+    """Fill the rotation (3, 3) of a quaternion w, x, y, z; return whether it is one."""
+    w, x, y, z = quaternion.tolist()
+    size = w * w + x * x + y * y + z * z
+    if not abs(size - 1.0) <= 2.0 * _NORM:  # not-a-number neither
+        return False
+    s = 2.0 / size
+    matrix[0, 0], matrix[0, 1], matrix[0, 2] = (
+        1.0 - s * (y * y + z * z),
+        s * (x * y - w * z),
+        s * (x * z + w * y),
+    )
+    matrix[1, 0], matrix[1, 1], matrix[1, 2] = (
+        s * (x * y + w * z),
+        1.0 - s * (x * x + z * z),
+        s * (y * z - w * x),
+    )
+    matrix[2, 0], matrix[2, 1], matrix[2, 2] = (
+        s * (x * z - w * y),
+        s * (y * z + w * x),
+        1.0 - s * (x * x + y * y),
+    )
+    return True
+
+
+class HandTurn:
+    """Orientation of the hand in the body's axes, checked; and the inputs by which it turns a tool.
+
+    `angle` (3,), rad, sums the small turns of the hand since it took hold. `fault` says that the device reports
+    impossible orientations, three in a row.
+    """
+
+    def __init__(self, axes: Axes, upright: bool, parameters: Sequence[Range], axis: np.ndarray) -> None:
+        self.fault, self._doubts, self._since = False, 0, 0.0
+        self.angle, self.tool = np.zeros(3), np.eye(3)
+        turn = np.array(axes, dtype=np.float64)
+        self._to_body = np.ascontiguousarray(_UPRIGHT @ turn if upright else turn)
+        self._hand, self._new, self._held = np.eye(3), np.eye(3), False
+        names = [r.name for r in parameters]
+        self._inputs = [(names.index(name), k) for k, name in enumerate(_TURNS) if name in names]
+        self._ranges = [(parameters[i].low, parameters[i].high) for i, _ in self._inputs]
+        self._axis = axis
+
+    def see(self, quaternion: np.ndarray, elapsed: float, *, holding: bool) -> None:
+        """Take an orientation w, x, y, z in the device's axes, `elapsed` s after the one before."""
+        P = self._to_body
+        self._since += elapsed
+        whole = rotation_of(quaternion, self._new)
+        new = P @ self._new @ P.T if whole else self._hand
+        change = new @ self._hand.T
+        step = _logarithm(change)
+        if not whole or (self._held and math.hypot(*step) > _FASTEST * max(self._since, _SHORTEST)):
+            self._doubts += 1
+            self.fault = self._doubts >= _PATIENCE
+            self._held = self._held and not self.fault
+        else:
+            self._doubts, self.fault = 0, False
+            if self._held and holding:
+                self.angle += step
+                self.tool = change @ self.tool
+            self._held = holding
+        if self._doubts == 0 or (whole and self.fault):  # after a fault the newest one is believed again
+            self._since = self._since if step == _STILL else 0.0
+            self._hand[:] = new
+
+    def into(self, parameters: np.ndarray) -> None:
+        """Put the turn into the further inputs (p,) that turn the tool; where nobody holds it, begin from them."""
+        if not self._inputs:
+            return
+        if not self._held:
+            w = [0.0, 0.0, 0.0]
+            for number, k in self._inputs:
+                w[k] = float(parameters[number])
+            self.tool = _exponential(w)
+            return
+        w = _logarithm(self.tool) if len(self._inputs) == 3 else _swing(self._axis, self.tool @ self._axis)
+        for (number, k), (low, high) in zip(self._inputs, self._ranges, strict=True):
+            parameters[number] = min(max(w[k], low), high)
+
+    def torque_to_device(self, torque: np.ndarray, sent: np.ndarray) -> None:
+        """Write a torque (3,) in the body's axes into `sent`, in the device's."""
+        np.dot(self._to_body.T, torque, out=sent)
+
+
+class TorqueOnHand:
+    """The torque that a device renders: limited, ramped, passive, and zero with the gate closed.
+
+    `torque` (3,), N m in the body's axes, is what is sent. `slack` (J) is the work that the hand has put into turns.
+    """
+
+    def __init__(self, max_torque: float, period: float, scale: float, mass: float) -> None:
+        self.torque = np.zeros(3)
+        self.work = 0.0
+        self._scale = scale
+        self._safety = Safety(Limits(max_torque), period, self.torque)
+        self.passivity = PassivityController(period, max_force=max_torque / LEVER, mass=mass)
+        self._watch = OscillationWatch(period, max_torque)
+        self._place, self._force, self._wanted = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._last = np.zeros(3)
+
+    def send(
+        self, wanted: np.ndarray, angle: np.ndarray, elapsed: float, stored: float, *, gate: bool, free: bool
+    ) -> bool:
+        """Renew `torque` from that of the tool (3,), N m, at the hand's `angle` (3,), rad; return False if it swings.
+
+        `stored` is the energy that the body can give back to turns, J.
+        """
+        np.divide(wanted, self._scale, out=self._wanted)
+        x, y, z = (angle - self._last).tolist()
+        a, b, c = self.torque.tolist()
+        self.work -= a * x + b * y + c * z
+        self._last[:] = angle
+        if not gate or not math.isfinite(self._wanted.sum()):
+            self.stop()
+            return True
+        self._safety.apply(self._wanted, gate=True)
+        np.multiply(angle, LEVER, out=self._place)
+        np.divide(self.torque, LEVER, out=self._force)
+        clamped = self._safety.clamped
+        self.passivity.apply(self._place, self._force, elapsed, stored=stored, clamped=clamped, free=free)
+        if self.passivity.damping > 0.0:
+            np.multiply(self._force, LEVER, out=self.torque)
+        if self._safety.slew():
+            np.divide(self.torque, LEVER, out=self._force)
+            self.passivity.amend(self._force)
+        if self._watch.see(self.torque, 0.0):
+            self.stop()
+            return False
+        return True
+
+    def stop(self) -> None:
+        """Zero torque now; the next open gate ramps in again."""
+        self._safety.stop()
+        self.passivity.interrupt()
+        self._watch.reset()
+
+
+def _logarithm(R: np.ndarray) -> list[float]:
+    """Return the rotation vector of a rotation (3, 3), rad, of an angle below π."""
+    x, y, z = float(R[2, 1] - R[1, 2]), float(R[0, 2] - R[2, 0]), float(R[1, 0] - R[0, 1])
+    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
+    cosine = 0.5 * (float(R[0, 0] + R[1, 1] + R[2, 2]) - 1.0)
+    factor = 0.5 if sine < 1e-8 else 0.5 * math.atan2(sine, cosine) / sine
+    return [factor * x, factor * y, factor * z]
+
+
+def _exponential(w: Sequence[float]) -> np.ndarray:
+    """Return the rotation (3, 3) of a rotation vector in rad, by Rodrigues' formula."""
+    angle = math.hypot(*w)
+    if angle == 0.0:
+        return np.eye(3)
+    a, b, c = (value / angle for value in w)
+    K = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K)
+
+
+def _swing(before: np.ndarray, after: np.ndarray) -> list[float]:
+    """Return the rotation vector in the x–y plane that turns one unit vector (3,) into another, rad."""
+    dx, dy, _ = (after - before).tolist()
+    size = math.hypot(dx, dy)
+    if size < 1e-12:
+        return [0.0, 0.0, 0.0]
+    n = np.array(
+        [-dy / size, dx / size, 0.0]
+    )  # at right angles to the change, so both have the same part along it
+    across = before - (n @ before) * n
+    angle = math.atan2(float(n @ np.cross(across, after)), float(across @ after))
+    return [angle * float(n[0]), angle * float(n[1]), 0.0]

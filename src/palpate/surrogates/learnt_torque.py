@@ -1,0 +1,162 @@
+"""Torque on a tool about its place, in N m.
+
+The energy of a tool whose orientation stays does not tell its torque. It is learnt beside the energy, as the torque
+per newton of force, a = τ/‖F‖ in m: this arm stays smooth where contact begins and both are zero, and no arm is longer
+than the tool is wide. Beyond the trained ranges the arm stays that of their border.
+
+The energy of a tool whose orientation is an input tells it. With the rotation vector w, which turns the tool after its
+fixed rotation, a small turn φ of the tool is J(w) δw, J the left Jacobian of the rotations. So Jᵀ τ = −∂U/∂w. Where two
+components of w are inputs, the torque about the tool's own axis is taken to be zero, as it is for a tool of revolution.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from palpate.surrogates.arguments import rows_of
+from palpate.surrogates.energy import LearntEnergy
+from palpate.surrogates.learnt_quantities import LearntQuantities
+from palpate.units import Range, bounds
+
+__all__ = [
+    "ARM",
+    "TURNS",
+    "TorqueEvaluator",
+    "TurnEvaluator",
+    "left_jacobian",
+    "torque_evaluator",
+    "torque_of_slopes",
+    "torques",
+    "turn_inputs",
+]
+
+ARM = "arm"
+"""Name of the learnt quantities that hold the torque per newton, m."""
+TURNS = ("tip_rx", "tip_ry", "tip_rz")
+"""Inputs that are components of the rotation vector by which a tool is turned, rad."""
+STEP = 1e-4  # rad; the energy's third derivative by it leaves 1e-8 of the torque, its rounding 1e-12 of the energy
+
+
+def turn_inputs(inputs: Sequence[Range]) -> tuple[int, ...]:
+    """Return the numbers of the inputs that turn a tool, of tip_rx, tip_ry and tip_rz those that are there."""
+    names = [r.name for r in inputs]
+    return tuple(names.index(name) for name in TURNS if name in names)
+
+
+def left_jacobian(w: np.ndarray) -> np.ndarray:
+    """Return J (3, 3) of a rotation vector w (3,) in rad: exp(w + δw) = exp(J δw) exp(w)."""
+    angle = float(np.linalg.norm(w))
+    a, b, c = w.tolist()
+    K = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
+    if angle < 1e-4:  # the next terms are of the fourth order
+        first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
+    else:
+        first = (1.0 - math.cos(angle)) / angle**2
+        second = (angle - math.sin(angle)) / angle**3
+    return np.asarray(np.eye(3) + first * K + second * K @ K)
+
+
+def torques(energy: LearntEnergy, evaluator: Any, X: np.ndarray) -> np.ndarray:
+    """Return τ (N, 3) in N m by an evaluator, at inputs X (N, n) of a tool."""
+    rows, found = rows_of(X, energy.inputs, "learnt body"), np.zeros((len(X), 3))
+    for x, force, torque in zip(rows, energy.force(X), found, strict=True):
+        evaluator(x[:3], x[3:], force)
+        torque[:] = evaluator.torque
+    return found
+
+
+class TorqueEvaluator:
+    """Torque by a learnt arm, one place at a time and without allocation: `torque` (3,), N m, is renewed by a call."""
+
+    def __init__(self, arm: LearntQuantities) -> None:
+        self.torque = np.zeros(3)
+        self._low, self._high = bounds(arm.inputs)
+        self._x = np.zeros(len(arm.inputs))
+        self._arm = arm.network.evaluator()
+
+    def __call__(self, position: np.ndarray, parameters: np.ndarray, force: np.ndarray) -> None:
+        """Renew the torque at a place (3,) in m and further inputs (p,), where the tool feels a force (3,) in N."""
+        x, y, z = force.tolist()
+        size = math.sqrt(x * x + y * y + z * z)
+        if size == 0.0:
+            self.torque[:] = 0.0
+            return
+        self._x[:3] = position
+        self._x[3:] = parameters
+        np.clip(self._x, self._low, self._high, out=self._x)
+        np.multiply(self._arm(self._x), size, out=self.torque)
+
+
+class TurnEvaluator:
+    """Torque by the energy's slopes along the turns: `torque` (3,), N m, is renewed by a call.
+
+    The energy is asked by `energy`, a function of a place (3,) in m and further inputs (p,) that returns U in J; `turns`
+    are the numbers of the further inputs that turn the tool, `rotation` (3, 3) its fixed rotation.
+    """
+
+    def __init__(
+        self,
+        energy: Callable[[np.ndarray, np.ndarray], float],
+        turns: Sequence[int],
+        names: Sequence[str],
+        rotation: np.ndarray,
+    ) -> None:
+        self.torque = np.zeros(3)
+        self._energy, self._turns = energy, tuple(turns)
+        self._axes = [TURNS.index(name) for name in names]
+        self._down = rotation[:, 2]
+        self._w = np.zeros(3)
+
+    def __call__(self, position: np.ndarray, parameters: np.ndarray, force: np.ndarray) -> None:
+        """Renew the torque at a place (3,) in m and further inputs (p,), where the tool feels a force (3,) in N."""
+        if not force.any():
+            self.torque[:] = 0.0
+            return
+        slope, moved = np.zeros(3), parameters.copy()
+        for number, axis in zip(self._turns, self._axes, strict=True):
+            self._w[axis] = parameters[number]
+            moved[number] = parameters[number] + STEP
+            above = self._energy(position, moved)
+            moved[number] = parameters[number] - STEP
+            slope[axis] = (self._energy(position, moved) - above) / (2.0 * STEP)
+            moved[number] = parameters[number]
+        self.torque[:] = torque_of_slopes(slope, self._w, self._axes, self._down)
+
+
+def torque_of_slopes(slope: np.ndarray, w: np.ndarray, axes: Sequence[int], down: np.ndarray) -> np.ndarray:
+    """Return τ (3,) in N m of slopes −∂U/∂w (3,), those of `axes` being known, at a rotation vector w (3,).
+
+    `down` (3,) is the tool's own axis before w turns it.
+    """
+    J = left_jacobian(w)
+    rows, known = J.T[list(axes)], slope[list(axes)]
+    if len(axes) < 3:
+        # exp(w) = 1 + K J
+        a, b, c = w.tolist()
+        K = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
+        rows, known = np.vstack([rows, down + K @ (J @ down)]), np.append(known, 0.0)
+    return np.asarray(np.linalg.solve(rows, known))
+
+
+def torque_evaluator(energy: LearntEnergy, arm: LearntQuantities | None) -> Any:
+    """Return the evaluator of an energy's torque: by a learnt arm, by turns among its inputs, or None of neither."""
+    if arm is not None:
+        return TorqueEvaluator(arm)
+    felt = len(energy.inputs) - len(energy.parameters)
+    turns = turn_inputs(energy.inputs)
+    tool = getattr(energy.baseline, "posed_tool", None)
+    if len(turns) < 2 or tool is None:
+        return None
+    own = energy.evaluator()
+
+    def ask(position: np.ndarray, parameters: np.ndarray) -> float:
+        own(position, parameters)
+        return own.energy
+
+    names = [energy.inputs[i].name for i in turns]
+    rotation = np.eye(3) if tool.turn is None else tool.turn
+    return TurnEvaluator(ask, [i - felt for i in turns], names, rotation)

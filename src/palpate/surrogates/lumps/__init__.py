@@ -1,0 +1,13 @@
+"""Hidden lumps: what they are, the energy that they add to a learnt body, and how a body takes that energy.
+
+::
+
+    lump           one lump: place, radius and ratio of moduli
+    lump_contrast  the learnt energy that any lump adds, by place of the hand and by lump
+    lump_units     further units of a body's network that carry the lumps which were chosen
+"""
+
+from palpate.surrogates.lumps.lump import Lump
+from palpate.surrogates.lumps.lump_contrast import LumpContrast, LumpRoom
+
+__all__ = ["Lump", "LumpContrast", "LumpRoom"]

@@ -1,0 +1,259 @@
+"""The energy that a lump adds to a learnt body, learnt from presses without a lump.
+
+Of a press at c whose energy is U and whose body has the strain-energy density W, a lump of share χ and x = ratio − 1
+takes
+
+    D = ∫ χ W dV           what it would take if nothing moved
+    β = −½ ∂²U/∂x² / D     how much the tissue gives way to it: (½ bᵀK⁻¹b + 0.4 ∫ χ(1 − χ) W dV)/D with b = ∂D/∂u
+                           and the tangent K; the second term is of the soft edge, see `lump`
+    ΔU ≈ x D/(1 + β x) · exp(k s²),   s = βx/(1 + βx)
+
+x D/(1 + β x) is the [1/1] Padé approximant in x, a lower bound in linear elasticity, as ΔU/x is a Stieltjes function
+there (Milton 2002, The Theory of Composites, ch. 27). Its shortfall depends on s alone, and k is fitted to a few
+presses with a lump. Learnt are ln(D/U) and ln β over the place of the hand, the offset of the lump from it and ln r:
+
+    ln(D/U) = N(c, p − c, ln r) + 3 ln r − e ln |p − c|
+
+So ΔU is positive for a stiff lump, falls with the distance as |p − c|^−e, and is zero at ratio 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.checks import own_arrays
+from palpate.errors import UsageError
+from palpate.format import millimetres, share
+from palpate.network import Network
+from palpate.surrogates.lumps.lump import EDGE, Lump, require_apart
+from palpate.units import Range
+
+if TYPE_CHECKING:
+    from palpate.surrogates.energy import LearntEnergy
+
+__all__ = ["LumpContrast", "LumpRoom", "contrast_inputs", "value_and_slopes"]
+
+SLACK = 1e-9  # of a range: a number at its end is inside
+
+
+@dataclass(frozen=True, eq=False)
+class LumpRoom:
+    """The room in a body where lumps were looked up, and their sizes.
+
+    Attributes
+    ----------
+    lower, upper : (3,)
+        Corners in m of the box of a lump's centre.
+    radius : Range
+        Of radii, m.
+    ratio : Range
+        Of ratios of moduli.
+    cover : float
+        Least tissue in m between a lump's edge and the touched surface.
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    radius: Range
+    ratio: Range
+    cover: float = 0.0
+
+    def __post_init__(self) -> None:
+        own_arrays(self, "lower", "upper")
+        fits = self.lower.shape == self.upper.shape == (3,) and bool((self.lower < self.upper).all())
+        if not fits or self.radius.low <= 0 or self.ratio.low <= 0:
+            raise UsageError(
+                f"There is no room for lumps from {self.lower} to {self.upper} m.",
+                why="The lower corner must lie below the upper one, and radius and ratio are positive.",
+                fix="Give two corners of a box inside the body, in m.",
+            )
+
+    def require(self, lump: Lump) -> None:
+        """Refuse a lump that lies outside or has another size.
+
+        Raises
+        ------
+        UsageError
+            If its centre, its radius or its ratio is beyond what was looked up.
+        """
+        place, spans = np.array(lump.place), self.upper - self.lower
+        low, high = (millimetres(*corner) for corner in (self.lower, self.upper))
+        if (place < self.lower - SLACK * spans).any() or (place > self.upper + SLACK * spans).any():
+            raise UsageError(
+                f"The {lump} is outside the room for lumps.",
+                why=f"Their centres may lie between {low} and {high} in the body's frame.",
+                fix="Move it there, or learn a body with more room.",
+            )
+        for what, value, own, scale, unit in (
+            ("radius", lump.radius, self.radius, 1e3, " mm"),
+            ("ratio", lump.ratio, self.ratio, 1.0, ""),
+        ):
+            if not own.low * (1 - SLACK) <= value <= own.high * (1 + SLACK):
+                raise UsageError(
+                    f"The {what} of the {lump} is {scale * value:.3g}{unit}.",
+                    why=f"It was learnt for {scale * own.low:.3g} to {scale * own.high:.3g}{unit}.",
+                    fix=f"Choose a {what} between these.",
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class LumpContrast:
+    """What any lump adds to a body's energy, as a value that its file keeps.
+
+    Attributes
+    ----------
+    density : Network
+        N of ln(D/U): seven inputs, the hand's place (m), the lump's offset from it (m) and ln(radius/m).
+    compliance : Network
+        Of ln β, of the same inputs.
+    decay : float
+        Exponent e of the distance between hand and lump.
+    curvature : float
+        Constant k of the closed form.
+    room : LumpRoom
+        Where lumps may be, and how large.
+    meta : mapping
+        JSON-able record: solves, lookups, and ``contrast_error`` (a mapping with ``median`` and ``p95``), the error of
+        the change of force over that change, where it is above 1 % of the force.
+
+    Raises
+    ------
+    UsageError
+        If the networks have other than seven inputs or more than one output.
+    """
+
+    density: Network
+    compliance: Network
+    decay: float
+    curvature: float
+    room: LumpRoom
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for network in (self.density, self.compliance):
+            if len(network.inputs) != 7 or len(network.outputs) != 1 or network.radial != "gaussian":
+                raise UsageError(
+                    f"{network} is none of the energy of a lump.",
+                    why="That takes seven inputs (place of the hand, offset of the lump, ln radius), one output and "
+                    "Gaussian units.",
+                    fix="Let `palpate.learn` make it of a sweep of `palpate.LumpProblem`.",
+                )
+
+    def __str__(self) -> str:
+        error = self.meta.get("contrast_error", {})
+        words = (
+            f"; contrast error {share(error['median'])} median, {share(error['p95'])} p95" if error else ""
+        )
+        r = self.room.radius
+        return f"lumps ⌀{2e3 * r.low:.3g}–{2e3 * r.high:.3g} mm: {self.density.units} units{words}"
+
+    __repr__ = __str__
+
+    def looked_up(self, lump: Lump, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return ln(D/U) (N,), its slopes by the place (N, 3) in 1/m, ln β (N,) and its slopes, at places X (N, 3)."""
+        return self.looked_up_at(
+            contrast_inputs(X, np.broadcast_to(lump.place, X.shape), np.full(len(X), lump.radius))
+        )
+
+    def looked_up_at(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return the same of inputs Z (N, 7), each of its own lump (see `contrast_inputs`)."""
+        value, slopes = value_and_slopes(self.density, Z)
+        softness, bends = value_and_slopes(self.compliance, Z)
+        offset, squared = Z[:, 3:6], (Z[:, 3:6] ** 2).sum(axis=1)
+        value = value + 3.0 * Z[:, 6] - 0.5 * self.decay * np.log(squared)
+        # the offset is the lump's place less the hand's
+        by_place = slopes[:, :3] - slopes[:, 3:6] + self.decay * offset / squared[:, None]
+        return value, by_place, softness, bends[:, :3] - bends[:, 3:6]
+
+    def added(self, lump: Lump, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ΔU/U (N,) of a lump and its slopes by the hand's place (N, 3) in 1/m, at places X (N, 3) in contact.
+
+        Raises
+        ------
+        UsageError
+            If the lump is outside the room for lumps.
+        """
+        self.room.require(lump)
+        value, by_place, softness, bends = self.looked_up(lump, X)
+        return closed_form(np.exp(value), by_place, np.exp(softness), bends, lump.ratio - 1.0, self.curvature)
+
+    def answer(
+        self, energy: LearntEnergy, lumps: Sequence[Lump], X: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return energy (N,) in J and force (N, 3) in N of a body with lumps, at places X (N, 3) of the hand.
+
+        Raises
+        ------
+        UsageError
+            If a lump leaves its room, two meet, or one comes out of the touched surface.
+        """
+        self.require(energy, lumps)
+        U, force, _ = energy.response(X)
+        touching = U > 0
+        total, slopes = np.zeros(len(X)), np.zeros((len(X), 3))
+        for lump in lumps:
+            value, slope = self.added(lump, X[touching])
+            total[touching] += value
+            slopes[touching] += slope
+        return U * (1.0 + total), force * (1.0 + total)[:, None] - U[:, None] * slopes
+
+    def require(self, energy: LearntEnergy, lumps: Sequence[Lump]) -> None:
+        """Refuse lumps that leave their room, meet, or come out of the touched surface.
+
+        Raises
+        ------
+        UsageError
+            For the first that does.
+        """
+        require_apart(tuple(lumps))
+        for lump in lumps:
+            self.room.require(lump)
+            # the depth of a ball at the lump's centre is its radius and the cover of that centre
+            cover = float(energy.depth(np.array([lump.place]))[0]) - energy.baseline.radius
+            least = EDGE * lump.radius + self.room.cover
+            if cover < least * (1 - SLACK):
+                raise UsageError(
+                    f"The {lump} leaves the skin.",
+                    why=f"Its centre is {1e3 * cover:.3g} mm below the touched surface; with its edge and the tissue over "
+                    f"it, it needs {1e3 * least:.3g} mm.",
+                    fix=f"Move it {1e3 * (least - cover):.2g} mm deeper, or make it smaller.",
+                )
+
+
+def closed_form(
+    density: np.ndarray, by_place: np.ndarray, beta: np.ndarray, bends: np.ndarray, x: Any, k: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return ΔU/U (N,) and its slopes (N, 3) from D/U, ∇ln(D/U), β, ∇ln β, x = ratio − 1 and k."""
+    s = beta * x / (1.0 + beta * x)
+    value = x * density / (1.0 + beta * x) * np.exp(k * s**2)
+    # ∂ ln(ΔU)/∂ ln β, as ∂s/∂ ln β = s (1 − s)
+    by_beta = -s + 2.0 * k * s**2 * (1.0 - s)
+    return value, np.asarray(value)[:, None] * (by_place + by_beta[:, None] * bends)
+
+
+def contrast_inputs(X: np.ndarray, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return the inputs (N, 7) of the networks: the hand's places X (N, 3), the lumps' offsets from it, ln radius."""
+    return np.column_stack([X, places - X, np.log(radii)])
+
+
+def value_and_slopes(network: Network, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the one output (N,) of a network of Gaussians and its slopes (N, n), at physical inputs Z (N, n)."""
+    scaling = network.scaling
+    xi = scaling.scale_inputs(Z)
+    value = network.tail[0, 0] + xi @ network.tail[0, 1:]
+    slopes = np.tile(network.tail[0, 1:], (len(Z), 1))
+    if network.units:
+        # all units have one shape, as learning makes them: ‖A ξ − b‖² is a product of two tables
+        A, b = network.factors[0], network.shifts
+        far = xi @ A.T
+        q = (far**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * far @ b.T
+        phi = np.exp(-np.maximum(q, 0.0)) * network.weights[0]
+        total = phi.sum(axis=1)
+        value = value + total
+        slopes -= 2.0 * (total[:, None] * far - phi @ b) @ A
+    size = scaling.output_scale[0]
+    return scaling.output_centre[0] + size * value, size * slopes / scaling.input_half

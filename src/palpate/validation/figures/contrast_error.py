@@ -1,0 +1,51 @@
+"""Error of what a hidden lump changes: the learnt change of force against the solved one, over the solved one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.format import share
+from palpate.learning.lumps import LumpPresses
+from palpate.learning.lumps.learn_lumps import change_errors
+from palpate.validation.figures.figure import Figure, Measured
+from palpate.validation.subject import Subject
+
+__all__ = ["ContrastError", "contrast_error"]
+
+FEWEST = 8  # presses with a lump, below which their 95th percentile is the largest
+
+
+@dataclass(frozen=True)
+class ContrastError(Figure):
+    """Errors of the change of force over the change, of presses where that is above 1 % of the force."""
+
+    count: int  # presses solved with a lump whose change of force counts
+    median: float
+    p95: float
+
+    def measured(self) -> Measured:
+        """Return the value that is compared with a limit."""
+        return {"contrast_p95": (self.p95, None)}
+
+    def lines(self) -> list[str]:
+        """Return the median and the number of presses."""
+        return [f"Contrast of lumps: median error {share(self.median)} on {self.count} presses with a lump"]
+
+
+def contrast_error(subject: Subject) -> ContrastError | str | None:
+    """Return the contrast error on unseen presses, or the reason why there is none."""
+    lumps, data = subject.lumps, subject.data
+    if lumps is None or data is None or "lump_energy" not in data:
+        return None
+    presses = LumpPresses.of(data)
+    judged = presses.judged
+    if len(judged) < FEWEST:
+        return (
+            f"The contrast of lumps is not judged: it takes {FEWEST} unseen presses whose lump changes the force by 1 % "
+            f"or more, and there are {len(judged)}."
+        )
+    errors = change_errors(lumps, presses.take(judged))
+    median, p95 = np.quantile(errors, [0.5, 0.95])
+    return ContrastError(len(judged), float(median), float(p95))

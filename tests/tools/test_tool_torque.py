@@ -1,0 +1,126 @@
+"""The torque on a learnt tool: by a learnt arm, by the energy's slopes along its turns, and in exported forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import palpate as pp
+import pressed
+import tooled
+from palpate.errors import UsageError
+from palpate.export import export_c
+from palpate.export.lib_export import export_lib
+from palpate.runtime.touchable import touchable
+from palpate.surrogates.learnt_torque import TurnEvaluator, left_jacobian, torque_of_slopes
+from palpate.tools import PosedTool, Sphere
+
+
+def rotation(w):
+    """exp of a rotation vector (3,)."""
+    turn = PosedTool(Sphere(0.01), tuple(w)).turn
+    return np.eye(3) if turn is None else turn
+
+
+@pytest.fixture(scope="module")
+def body():
+    return tooled.surrogate()
+
+
+def test_a_learnt_arm_times_the_force_is_the_torque(body):
+    X = pressed.places(50)
+    np.testing.assert_allclose(body.torque(X), tooled.torque(X), rtol=1e-9, atol=1e-18)
+    above = X + np.array([0.0, 0.0, 0.02])
+    assert (body.torque(above) == 0.0).all()
+
+
+def test_beyond_the_ranges_the_arm_stays_that_of_their_border(body):
+    inside, outside = np.array([[0.02, 0.0, 0.006]]), np.array([[0.05, 0.0, 0.006]])
+    arms = [body.torque(X) / np.linalg.norm(body.energy.force(X)) for X in (inside, outside)]
+    np.testing.assert_allclose(arms[1], arms[0], rtol=1e-12)
+
+
+def test_the_hand_and_the_file_tell_the_same_torque(body, tmp_path):
+    again, X = pp.load(body.save(tmp_path / "tool.palpate")), pressed.places(20)
+    np.testing.assert_array_equal(again.torque(X), body.torque(X))
+    hand = touchable(again).evaluator()
+    for x, torque in zip(X, body.torque(X), strict=True):
+        hand.place(x.copy(), holding=True, believed=True)
+        hand(x, np.zeros(0))
+        np.testing.assert_allclose(hand.torque, torque, rtol=1e-12)
+
+
+def test_a_body_under_a_ball_tells_none():
+    with pytest.raises(UsageError, match="tells no torque"):
+        pressed.surrogate().torque(pressed.places(1))
+
+
+def test_the_left_jacobian_takes_changes_of_the_vector_to_turns():
+    rng = np.random.default_rng(0)
+    for size in (0.0, 1e-5, 0.3, 2.0):
+        w, dw = rng.normal(size=3), 1e-6 * rng.normal(size=3)
+        w *= size / np.linalg.norm(w)
+        turned = rotation(left_jacobian(w) @ dw) @ rotation(w)
+        np.testing.assert_allclose(rotation(w + dw), turned, atol=1e-11)
+
+
+@pytest.mark.parametrize("names", [("tip_rx", "tip_ry"), ("tip_rx", "tip_ry", "tip_rz")])
+def test_the_torque_of_turns_is_the_work_of_every_small_turn(names):
+    """U(R) = c · R e: a tool of revolution about its axis e; dU of a small turn φ is −τ · φ."""
+    rng = np.random.default_rng(1)
+    first, c = rotation(rng.normal(size=3)), rng.normal(size=3)
+    axis = first[:, 2]
+
+    def energy(_, w):
+        return float(c @ rotation([*w, *[0.0] * (3 - len(w))]) @ axis)
+
+    turns = TurnEvaluator(energy, range(len(names)), names, first)
+    w = 0.4 * rng.normal(size=len(names))
+    turns(np.zeros(3), w, np.ones(3))
+    R = rotation([*w, *[0.0] * (3 - len(names))])
+    np.testing.assert_allclose(turns.torque, -np.cross(R @ axis, c), atol=1e-7)
+    for phi in 1e-5 * np.eye(3):
+        change = float(c @ (rotation(phi) - rotation(-phi)) @ R @ axis) / 2.0
+        assert change == pytest.approx(-turns.torque @ phi, abs=1e-12)
+    assert abs(turns.torque @ R @ axis) < 1e-7  # none about its own axis
+
+
+def test_slopes_of_an_energy_without_turns_are_the_torque_itself():
+    slope = np.array([0.1, -0.2, 0.3])
+    np.testing.assert_array_equal(torque_of_slopes(slope, np.zeros(3), (0, 1, 2), np.eye(3)[2]), slope)
+
+
+def test_a_tool_leaves_as_c_with_its_torque(body, tmp_path):
+    comparison = export_c(body, tmp_path / "c").comparison
+    assert comparison is not None
+    assert comparison.parts["torque"].count >= 500
+    assert comparison.passed
+
+
+@pytest.mark.full
+def test_a_tool_leaves_as_a_library_with_its_torque(body, tmp_path):
+    comparison = export_lib(body, tmp_path / "lib").comparison
+    assert comparison is not None
+    assert comparison.passed
+    assert comparison.parts["torque"].relative < 1e-9
+
+
+def test_a_learnt_arm_of_a_sphere_leads_to_its_centre():
+    """Of a frictionless ball the force goes through the centre: τ = m × F, m the way there from the place."""
+    from palpate.learning.learn_arm import learn_arm
+    from palpate.options import FitOptions
+
+    way, X = np.array([0.0, 0.0, pressed.RADIUS]), pressed.places(60)
+    data = pressed.dataset(pressed.solves(X), torque=np.cross(way, pressed.force(X)))
+    arm = learn_arm(data, data.ranges, FitOptions())
+    assert arm is not None
+    unseen = pressed.places(40, seed=9)
+    F = pressed.force(unseen)
+    about_centre = np.linalg.norm(F, axis=1)[:, None] * arm.predict(unseen) - np.cross(way, F)
+    size = np.linalg.norm(F, axis=1) * pressed.RADIUS
+    assert (np.linalg.norm(about_centre, axis=1) < 1e-3 * size).all()
+    assert math.isclose(
+        float(np.abs(arm.predict(unseen)[:, 2]).max()), 0.0, abs_tol=1e-12
+    )  # none about its axis

@@ -25,7 +25,7 @@ from palpate.physics.shapes.naming import require_name
 from palpate.physics.shapes.scan_file import LabelImage, clear_specks, name_labels, read_scan
 from palpate.physics.shapes.shape import Shape, require_size
 
-__all__ = ["UPWARDS", "ImportedScan"]
+__all__ = ["CUT_FACE", "UPWARDS", "ImportedScan"]
 
 UPWARDS = {
     "superior": (0.0, 0.0, 1.0),
@@ -36,6 +36,9 @@ UPWARDS = {
     "right": (-1.0, 0.0, 0.0),
 }
 """Directions of a patient that can point upwards, in the file's coordinates: x left, y posterior, z superior."""
+
+CUT_FACE = "cut"
+"""Name of the surface at which the body reaches the end of the image."""
 
 CUBES = 2000  # of an element's edge that fill the body, where no size is given: seconds a solve
 COARSER = 1.5  # largest element inside over that of the surfaces
@@ -251,7 +254,7 @@ def _body(
     names = list(image.names)
     present = [k for k in range(len(names)) if (region == k).any()]
     index = np.where(_on_cut(image, points[outer].mean(axis=1), spacing), len(names), behind - 1)
-    every = [*(f"{name} surface" for name in names), "cut"]
+    every = [*(f"{name} surface" for name in names), CUT_FACE]
     used, surface_of = np.unique(index, return_inverse=True)
     return BodyMesh(
         points,
@@ -274,8 +277,8 @@ def _on_cut(image: LabelImage, places: np.ndarray, spacing: float) -> np.ndarray
 def _told(path: str, image: LabelImage, mesh: BodyMesh, spacing: float) -> list[str]:
     """Return sentences about what became of each tissue; refuse a mesh that has lost one."""
     told = []
-    if "cut" in mesh.surfaces:
-        told.append("The body reaches the end of the image; its surface there is called 'cut'.")
+    if CUT_FACE in mesh.surfaces:
+        told.append(f"The body reaches the end of the image; its surface there is called {CUT_FACE!r}.")
     for name, wanted in image.volumes.items():
         there = mesh.region_volumes.get(name, 0.0)
         said = f"{1e6 * there:.3g} ml of {name} in the mesh, {1e6 * wanted:.3g} ml in the voxels"

@@ -57,6 +57,7 @@ from .shapes import Dome as Dome
 from .shapes import FineMesh as FineMesh
 from .shapes import Geometry as Geometry
 from .shapes import ImportedMesh as ImportedMesh
+from .shapes import ImportedScan as ImportedScan
 from .shapes import ImportedSolid as ImportedSolid
 from .shapes import Inclusion as Inclusion
 from .shapes import LayeredBlock as LayeredBlock

@@ -130,3 +130,24 @@ def test_a_tool_leaves_as_an_fmu_with_its_torque(body, tmp_path, version):
     assert done.comparison is not None
     assert done.comparison.passed
     assert done.comparison.parts["torque"].relative < 1e-9
+
+
+def test_an_arm_is_learnt_from_mirror_images_too():
+    """Solves on one side of a mirror plane tell the other: an arm along the mirror's normal turns round there."""
+    from palpate.learning.learn_arm import learn_arm
+    from palpate.options import FitOptions
+
+    def arms(X):
+        return np.column_stack([-2e-3 + X[:, 2], 0.1 * X[:, 0], 0.05 * X[:, 0]])  # x-mirror: (a, −b, −c)
+
+    X, mirror = pressed.places(60), np.diag([-1.0, 1.0, 1.0])
+    X[:, 0] = np.abs(X[:, 0])
+    data = pressed.dataset(
+        pressed.solves(X), torque=np.linalg.norm(pressed.force(X), axis=1)[:, None] * arms(X)
+    )
+    learnt = learn_arm(
+        data, data.ranges, FitOptions(), matrices=np.array([np.eye(3), mirror]), about=np.zeros(3)
+    )
+    assert learnt is not None
+    unseen = pressed.places(40, seed=9)
+    np.testing.assert_allclose(learnt.predict(unseen), arms(unseen), atol=2e-5)

@@ -28,12 +28,11 @@ import numpy as np
 
 from palpate.adapters.extra import import_extra
 from palpate.adapters.mujoco_callbacks import call_for, forget_scene
+from palpate.adapters.mujoco_tool import SceneTool, number_of, tool_of
 from palpate.errors import UsageError
 from palpate.format import millimetres
 from palpate.surrogates import Surrogate
 from palpate.surrogates.energy_evaluator import EnergyEvaluator
-from palpate.surrogates.learnt_torque import TURNS
-from palpate.tools.rotations import rotation_vector, swing_vector
 
 __all__ = ["SENSOR_VALUES", "SoftContact", "StiffStepWarning", "attach"]
 
@@ -44,7 +43,6 @@ _RADIUS_SLACK = 1e-3  # share of the learnt radius by which a tool's may differ
 _MILLIMETRES = 1e3
 # K Δt² / m beyond which the force is taken at the end of the step; an explicit step is unstable from 4 on
 _STIFF = 0.25
-_TURNED = math.radians(2.0)  # by which a tool of fixed orientation may be turned
 _MARGIN = 8.0  # how much lighter a tool may be, in some pose, than MuJoCo's estimate of it at rest
 
 
@@ -76,34 +74,6 @@ class _Place:
         self.parameters = contact.parameters.copy()
 
 
-class _Tool:
-    """What touches the body in the scene: a geom at its centre, or a site at its foremost point, in its own axes."""
-
-    def __init__(self, number: int, name: str, model: Any, body: Surrogate, posed: Any) -> None:
-        self.number, self.name, self.is_site = number, name, posed is not None
-        self.bound = int((model.site_bodyid if self.is_site else model.geom_bodyid)[number])
-        names = [r.name for r in body.parameters]
-        self.inputs = [(names.index(turn), k) for k, turn in enumerate(TURNS) if turn in names]
-        self._first = np.eye(3) if posed is None or posed.turn is None else np.asarray(posed.turn)
-
-    def place(self, data: Any) -> np.ndarray:
-        """Return its place (3,) in the scene, m."""
-        return (data.site_xpos if self.is_site else data.geom_xpos)[self.number]  # type: ignore[no-any-return]
-
-    def turn_into(self, parameters: np.ndarray, data: Any, body: np.ndarray) -> bool:
-        """Put its turn in the body's axes (3, 3) into the further inputs (p,); whether a fixed one is as it was learnt."""
-        if not self.is_site:
-            return True
-        R = body.T @ data.site_xmat[self.number].reshape(3, 3) @ self._first.T
-        if not self.inputs:
-            return bool(np.linalg.norm(rotation_vector(R)) <= _TURNED)
-        axis = self._first[:, 2]
-        w = rotation_vector(R) if len(self.inputs) == 3 else swing_vector(axis, R @ axis)
-        for number, k in self.inputs:
-            parameters[number] = w[k]
-        return True
-
-
 class SoftContact:
     """The force between one tool of a scene and one learnt body; made by `attach`.
 
@@ -118,7 +88,7 @@ class SoftContact:
     """
 
     def __init__(
-        self, model: Any, body: Surrogate, *, tool: _Tool, base: int, place: np.ndarray, turn: np.ndarray,
+        self, model: Any, body: Surrogate, *, tool: SceneTool, base: int, place: np.ndarray, turn: np.ndarray,
         parameters: np.ndarray, sensor: tuple[int, int] | None,
     ) -> None:  # fmt: skip
         self._mujoco = import_extra("mujoco", "mujoco")
@@ -144,7 +114,7 @@ class SoftContact:
 
     @property
     def torque(self) -> np.ndarray:
-        """Torque (3,) on the tool about its place at the last step, N m, in the scene's axes; its opposite acts, too."""
+        """Torque (3,) on the tool about its place, N m, as `force`: zero of a ball, which has none about its centre."""
         return self._last.torque
 
     @property
@@ -339,9 +309,9 @@ def attach(
     geom : str
         Name of the tool: a sphere of the learnt radius; of a body that is held, what holds it.
     site : str, optional
-        In place of `geom`, where the body was learnt under a tool of another shape: a site at the tool's foremost point,
-        whose axes are the tool's own, so that the tool points along the site's −z. A tool of fixed orientation counts
-        as outside the trained region where the site is turned from that by more than 2°.
+        In place of `geom`, where the body was learnt under a tool of another shape: a site at the tool's foremost
+        point, whose axes are the tool's own, so that the tool points along the site's −z. A tool of fixed orientation
+        counts as outside the trained region where the site is turned from that by more than 2°.
     at : (3,) or (7,)
         Place, m, and quaternion (w, x, y, z) of the learnt body's frame, in the frame of `on`.
     on : str
@@ -372,7 +342,7 @@ def attach(
             why="MuJoCo may step a state twice, or go back to an earlier one; the memory could not follow.",
             fix="Attach it without: body.with_memory(None).",
         )
-    tool, base = _tool_of(mujoco, model, learnt, geom, site), _index(mujoco, model, "body", on)
+    tool, base = tool_of(mujoco, model, learnt, geom, site), number_of(mujoco, model, "body", on)
     if _can_move(model, base) and not moves:
         raise UsageError(
             f"The body stands on {on!r}, which can move.",
@@ -406,23 +376,6 @@ def attach(
     return contact
 
 
-def _tool_of(mujoco: Any, model: Any, body: Surrogate, geom: str | None, site: str | None) -> _Tool:
-    """Return the tool by the name of its geom or of its site; one that doesn't fit what was learnt is refused."""
-    posed = getattr(body.hand_energy.baseline, "posed_tool", None)
-    named = geom if posed is None else site
-    if named is None or (geom is not None and site is not None):
-        raise UsageError(
-            f"The tool of {body.name!r} is not named as it must be.",
-            why="It was learnt under a ball or held by a pad, so that the scene has a geom for it."
-            if posed is None
-            else f"It was learnt under a {posed}, whose foremost point and axes a site of the scene tells.",
-            fix="Give geom=NAME, and no site."
-            if posed is None
-            else "Give site=NAME, and no geom: a site at the tool's foremost point, the tool pointing along its −z.",
-        )
-    return _Tool(_index(mujoco, model, "geom" if posed is None else "site", named), named, model, body, posed)
-
-
 def _can_move(model: Any, body: int) -> bool:
     """Return whether a body has a joint, or is led as a mocap body, by itself or by what bears it."""
     if int(model.body_weldid[body]):
@@ -439,23 +392,9 @@ def _unit(quaternion: np.ndarray) -> np.ndarray:
     return quaternion / length if length else np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def _index(mujoco: Any, model: Any, kind: str, name: str) -> int:
-    """Return the number of what has a name in the scene."""
-    number = int(mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
-    if number < 0:
-        rows = range(getattr(model, f"n{kind}"))
-        names = [getattr(model, kind)(k).name for k in rows]
-        raise UsageError(
-            f"The scene has no {kind} named {name!r}.",
-            why=f"Its names are {', '.join(repr(n) for n in names if n) or 'none: nothing has one'}.",
-            fix=f"Name the {kind} in the scene's XML, and give that name.",
-        )
-    return number
-
-
 def _sensor_of(mujoco: Any, model: Any, name: str) -> tuple[int, int]:
     """Return where the values of a user sensor begin, and how many there are."""
-    number = _index(mujoco, model, "sensor", name)
+    number = number_of(mujoco, model, "sensor", name)
     size = int(model.sensor_dim[number])
     if int(model.sensor_type[number]) != int(mujoco.mjtSensor.mjSENS_USER) or size > len(SENSOR_VALUES):
         raise UsageError(
@@ -466,8 +405,8 @@ def _sensor_of(mujoco: Any, model: Any, name: str) -> tuple[int, int]:
     return int(model.sensor_adr[number]), size
 
 
-def _parameters(body: Surrogate, model: Any, tool: _Tool, parameters: Sequence[float]) -> np.ndarray:
-    """Return the further inputs (p,), the tool's radius and turn among them, after the tool was compared with the body's."""
+def _parameters(body: Surrogate, model: Any, tool: SceneTool, parameters: Sequence[float]) -> np.ndarray:
+    """Return the further inputs (p,), the tool's radius and turn among them; a tool that was not learnt is refused."""
     baseline, felt = body.hand_energy.baseline, len(body.hand_energy.baseline.directions)
     values = [float(v) for v in parameters]
     own = None if baseline.radius_input is None else baseline.radius_input - felt
@@ -476,9 +415,8 @@ def _parameters(body: Surrogate, model: Any, tool: _Tool, parameters: Sequence[f
     radius = math.nan if tool.is_site else float(model.geom_size[tool.number, 0])
     for number, _ in tool.inputs if len(values) == len(body.parameters) - len(tool.inputs) else ():
         values.insert(number, 0.0)  # the scene tells them
-    if not baseline.holds:
-        if own is not None and len(values) == len(body.parameters) - 1:
-            values.insert(own, radius)
+    if not baseline.holds and own is not None and len(values) == len(body.parameters) - 1:
+        values.insert(own, radius)
     if len(values) != len(body.parameters) or not np.isfinite(values).all():
         names = ", ".join(r.name for r in body.parameters) or "none"
         raise UsageError(

@@ -295,7 +295,7 @@ class Touchable:
             radius=self.energy.baseline.radius,
             radius_input=self.radius_parameter,
             further=len(self.energy.parameters),
-            torque_at=torque_evaluator(self.energy, self.arm),
+            torque_at=torque_evaluator(self.energy, self.arm, few=few),
             few=few,
         )
 

@@ -103,6 +103,12 @@ export interface ToolInfo {
   sizes: SizeInfo[];
 }
 
+/** A region of a part of several, and its material as it can be typed. */
+export interface RegionInfo {
+  name: string;
+  material: string;
+}
+
 /** A place that a person has marked on the skin, m, or one that practice shows. */
 export interface ExamMark {
   number: number;
@@ -216,6 +222,7 @@ export interface PartFacts {
   materials: MaterialInfo[];
   laws: string[];
   tools: ToolInfo[];
+  regions: RegionInfo[];
   choices: Record<string, unknown>;
   notes: string[];
 }
@@ -231,6 +238,7 @@ export interface StartWish {
   trial: boolean;
   tool: string;
   sizes: Record<string, unknown>;
+  regions: Record<string, unknown>;
 }
 
 /** The wish that the numbers of the file are taken in another unit, page to server. */

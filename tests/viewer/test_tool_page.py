@@ -1,4 +1,4 @@
-"""The page of a body under a tool in a real browser: its shape, its turns, its torque; and the tool of a part's set-up."""
+"""The page of a body under a tool in a real browser: its shape, its turns, its torque."""
 
 from __future__ import annotations
 
@@ -9,11 +9,6 @@ import pytest
 from chromium_page import number, open_file, vector
 from playwright.sync_api import Page
 from slabs import TILT, slab_under_a_still_tool, slab_under_a_tool
-from test_part_page import begin, misfit, ready
-from test_part_page import chosen as chosen
-from test_part_page import page as part_page
-from test_part_page import server as server
-from test_part_page import study as study
 from test_pressed_page import middle, stand_still
 
 from palpate.runtime.touchable import touchable
@@ -23,8 +18,6 @@ from palpate.viewer.drawn_tool import drawn_tool
 from palpate.viewer.file_page import export_html
 
 pytestmark = [pytest.mark.full, pytest.mark.timeout(180)]
-
-part_page = part_page  # noqa: PLW0127  # a fixture under another name: `page` is that of a touched body
 
 
 @pytest.fixture(scope="module")
@@ -134,20 +127,3 @@ def test_a_drawn_tool_touches_the_plane_where_its_surface_begins():
     lowest = -tool.offset(np.array([[0.0, 0.0, 1.0]]))[0]
     assert lowest - 1e-7 <= heights.min() <= lowest + 0.004 * (1 - np.cos(np.radians(6.6)))
     assert drawn.turns == (0, 1, -1)
-
-
-def test_a_tool_is_chosen_for_a_part(server, part_page: Page, study, chosen, keep):
-    page = part_page
-    ready(page, server, study)
-    assert page.input_value("#tool") == "ball"
-    page.select_option("#tool", "punch")
-    assert page.is_hidden("#ball-radius")
-    begin(page, size_edge="0.001 mm")
-    assert "Choose one with a radius of at least" in misfit(page, "size-edge")
-    begin(page, size_edge="1 mm", size_radius="70 mm")
-    assert "140 mm across, and the part 40 mm long" in misfit(page, "size-radius")
-    keep(page, "part-tool")
-    begin(page, size_radius="4 mm", size_turn_x="5°", ball_depth="1 mm")
-    page.wait_for_function("() => document.documentElement.dataset.stage === 'working'")
-    assert str(chosen[0].interaction.build_tool()) == "punch of radius 4 mm, edge 1 mm, turned by 5°"
-    assert chosen[0].interaction.depth[1] == 1e-3

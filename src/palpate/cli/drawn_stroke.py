@@ -116,8 +116,8 @@ def _press(
         if not abs(distance[0]) <= max(depths[-1], surface.spacing):
             raise UsageError(
                 f"No contact at {_place(given)}: it does not lie on the touched surface.",
-                why="--at is the place of contact on the surface, and not where the ball's centre or the tool is, as in `palpate "
-                "ask --at`.",
+                why="--at is the place of contact on the surface, and not where the ball's centre or the tool is, as "
+                "in `palpate ask --at`.",
                 fix=_nearest(hand, surface, given),
             )
         normal = slope[0] / np.linalg.norm(slope[0])

@@ -1,8 +1,8 @@
 """Where and how deep a tool in any pose touches a surface, for the fields that go with it.
 
-A tool is the balls of its front (`palpate.tools.front_balls`). As in `PosedBaseline` its depth is their mean of order m,
-s = (Σ w_i s_i^m)^(1/m). The place and the normal of the touch are the means of theirs with the weights w_i s_i^(m−1),
-which move steadily as the tool tilts.
+A tool is the balls of its front (`palpate.tools.front_balls`). As in `PosedBaseline` its depth is their mean of order
+m, s = (Σ w_i s_i^m)^(1/m). The place and the normal of the touch are the means of theirs with the weights
+w_i s_i^(m−1), which move steadily as the tool tilts.
 """
 
 from __future__ import annotations

@@ -104,6 +104,7 @@ FACTS = PartFacts(
     whole=False,
     materials=(MaterialInfo("fat", "soft", "tissue", "3.3 kPa", "0.45"),),
     laws=("neo-hookean",),
+    regions=(),
     tools=(ToolInfo("capsule", "a bar", (SizeInfo("radius", "radius", "6 mm"),)),),
     choices=dataclasses.asdict(WISH),
     notes=("repaired",),

@@ -100,7 +100,9 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
     deepest = {"deepest": pressed.deepest or None}
     # a law that was asked for is taken as it is
     rivals = None if options.get("choose") is False else pressed.overlap_baselines
-    numbers = {} if pressed.tool is None else {ARM: partial(learn_arm, pressed.data, pressed.inputs)}
+    mirror = {"matrices": pressed.matrices, "about": pressed.about}
+    learn = partial(learn_arm, pressed.data, pressed.inputs, **mirror)
+    numbers = {} if pressed.tool is None else {ARM: learn}
     return Recognised(
         baseline,
         pressed.solves,

@@ -27,6 +27,7 @@ from palpate.surrogates.baselines.contact_baseline import (
     fill_law,
     leave_saturated,
 )
+from palpate.surrogates.baselines.graph_form import BaselineForm, Graph, Touch, Value
 from palpate.surrogates.baselines.tool_baseline import ToolBaseline
 from palpate.surrogates.energy_kernels import (
     BEND,
@@ -67,12 +68,12 @@ class PosedBaseline(ToolBaseline):
     tool : str
         The tool's description as JSON, from which `PosedTool.of` makes it.
     order : float
-        m, at least 2.
+        m, at least 2; the larger, the more the deepest ball counts.
     """
 
     name: ClassVar[str] = "posed"
 
-    order: float = 4.0
+    order: float = 8.0
 
     @cached_property
     def balls(self) -> np.ndarray:
@@ -114,9 +115,22 @@ class PosedBaseline(ToolBaseline):
         UsageError
             Always.
         """
-        raise UsageError(
+        raise self._unexported()
+
+    def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
+        """Refuse: it has no exported form yet.
+
+        Raises
+        ------
+        UsageError
+            Always.
+        """
+        raise self._unexported()
+
+    def _unexported(self) -> UsageError:
+        return UsageError(
             f"A body under {self.probe_words} can't be exported yet.",
-            why="Its baseline, that of a tool that turns or of a curved surface, has no form in C.",
+            why="Its baseline, that of a tool that turns or of a curved surface, has no exported form.",
             fix="Ask it in Python, feel it by `palpate run`, or learn a tool of one orientation on a plane surface.",
         )
 

@@ -16,6 +16,7 @@ from palpate.export.c_export import block_of
 from palpate.export.check_engine import CheckEngine, engine_library
 from palpate.export.fmu_export import export_fmu
 from palpate.export.lib_export import export_lib
+from palpate.export.onnx_export import export_onnx
 from palpate.export.wasm_core import WasmCore
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.learnt_torque import TurnEvaluator, torque_of_slopes
@@ -151,3 +152,19 @@ def test_an_arm_is_learnt_from_mirror_images_too():
     assert learnt is not None
     unseen = pressed.places(40, seed=9)
     np.testing.assert_allclose(learnt.predict(unseen), arms(unseen), atol=2e-5)
+
+
+def test_a_tool_leaves_as_onnx_and_as_functions_of_arrays_with_its_torque(body, tmp_path):
+    pytest.importorskip("onnxruntime")
+    comparison = export_onnx(body, tmp_path / "tool.onnx").comparison
+    assert comparison is not None
+    assert comparison.passed
+    assert comparison.parts["torque"].relative < 1e-9
+
+
+def test_a_tool_is_a_function_of_arrays_with_its_torque(body):
+    jax, X = pytest.importorskip("jax"), pressed.places(20)
+    jax.config.update("jax_enable_x64", True)
+    from palpate.adapters.jax import JaxBody
+
+    np.testing.assert_allclose(np.asarray(JaxBody(body).torque(X)), body.torque(X), rtol=1e-9)

@@ -27,6 +27,7 @@ from palpate.surrogates.baselines.contact_baseline import (
     fill_law,
     leave_saturated,
 )
+from palpate.surrogates.baselines.graph_form import BaselineForm, Graph, Touch, Value
 from palpate.surrogates.baselines.tool_baseline import ToolBaseline
 from palpate.surrogates.energy_kernels import (
     BEND,
@@ -118,6 +119,20 @@ class PosedBaseline(ToolBaseline):
             f"A body under {self.probe_words} can't be exported yet.",
             why="Its baseline, that of a tool that turns or of a curved surface, has no form in C.",
             fix="Ask it in Python, feel it by `palpate run`, or learn a tool of one orientation on a plane surface.",
+        )
+
+    def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
+        """Refuse: the mean over its balls has no form as a graph.
+
+        Raises
+        ------
+        UsageError
+            Always.
+        """
+        raise UsageError(
+            f"A body under {self.probe_words} has no ONNX form.",
+            why="Its baseline is that of a tool that turns or of a curved surface.",
+            fix="Ask it in Python, or learn a tool of one orientation on a plane surface.",
         )
 
     def coordinate(self, X: np.ndarray) -> np.ndarray:

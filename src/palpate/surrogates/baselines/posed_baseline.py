@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -108,18 +109,9 @@ class PosedBaseline(ToolBaseline):
         return self.name
 
     def c_source(self) -> str:
-        """Refuse: it has no exported form yet.
-
-        Raises
-        ------
-        UsageError
-            Always.
-        """
-        raise UsageError(
-            f"A body under {self.probe_words} can't be exported yet.",
-            why="Its baseline, that of a tool that turns or of a curved surface, has no form in C.",
-            fix="Ask it in Python, feel it by `palpate run`, or learn a tool of one orientation on a plane surface.",
-        )
+        """Return the kernels in C99, those of a contact before them."""
+        own = Path(__file__).with_suffix(".c").read_text("utf-8")
+        return f"{super().c_source()}\n{own}"
 
     def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
         """Refuse: the mean over its balls has no form as a graph.

@@ -160,7 +160,7 @@ class WasmCore:
             numbers, modes = shape[FRAME + MOST + 1 :], len(field.modes)
             value += np.tensordot(numbers[:modes], field.modes, axes=1)
             if field.local_mode is not None:
-                _add_local(value, numbers[modes:], field, shape[2:5])
+                _add_local(value, numbers[modes:], field, shape[2:5] + np.array(field.shift))
         return out
 
 

@@ -123,6 +123,11 @@ class Touchable:
         return line_of(self.fields)
 
     @property
+    def tells_torque(self) -> bool:
+        """True where the torque on a tool is known: it was learnt, or turns of the tool are inputs."""
+        return torque_evaluator(self.energy, self.arm) is not None
+
+    @property
     def tool_axis(self) -> np.ndarray:
         """The tool's own axis (3,), a unit vector; z of a probe that has none."""
         turn = getattr(getattr(self.energy.baseline, "posed_tool", None), "turn", None)

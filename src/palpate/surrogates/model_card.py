@@ -300,8 +300,8 @@ def _limits_of(body: Any, meta: Mapping[str, Any]) -> list[str]:
         room = body.lumps.room
         ends = " to ".join(millimetres(*corner) for corner in (room.lower, room.upper))
         limits.append(
-            f"Lumps have soft edges and may have diameters of {2e3 * room.radius.low:.3g} to {2e3 * room.radius.high:.3g} "
-            f"mm, {room.ratio.low:.3g} to {room.ratio.high:.3g} times the modulus, centres within {ends}, and do not meet."
+            f"Lumps have soft edges, diameters of {2e3 * room.radius.low:.3g} to {2e3 * room.radius.high:.3g} mm, "
+            f"{room.ratio.low:.3g} to {room.ratio.high:.3g} times the modulus, centres within {ends}, and do not meet."
         )
     known = "say" if body.energy.root is not None else "do not say"
     limits.append(f"The answers {known} how far the force may be off from place to place.")

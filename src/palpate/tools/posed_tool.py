@@ -15,6 +15,7 @@ from palpate.errors import UsageError
 from palpate.tools.edged_tools import Box, Cylinder, Punch
 from palpate.tools.rotations import rotation_matrix
 from palpate.tools.round_tools import Capsule, Cone, Fingertip, Sphere
+from palpate.tools.scanned_tool import ScannedTool
 from palpate.tools.tool_shape import Tool
 from palpate.units import Range
 
@@ -31,7 +32,7 @@ ANGLES: dict[str, tuple[str, ...]] = {
 MOST_TILT = math.pi / 2  # rad; a tool that lies over farther does not press with its tip
 
 SHAPES: dict[str, type[Tool]] = {
-    shape.__name__: shape for shape in (Box, Capsule, Cone, Cylinder, Fingertip, Punch, Sphere)
+    shape.__name__: shape for shape in (Box, Capsule, Cone, Cylinder, Fingertip, Punch, ScannedTool, Sphere)
 }
 
 

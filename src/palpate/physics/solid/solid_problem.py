@@ -36,6 +36,7 @@ from palpate.physics.solid.solid_checks import (
 )
 from palpate.processes import CASE_LIMIT
 from palpate.supervised import run_in_child
+from palpate.tools import PosedTool
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -336,6 +337,16 @@ class SolidProblem:
             if isinstance(interaction, SphereProbe):
                 return interaction, np.asarray(x[first : first + 3])
             first += len(interaction.ranges(self.body.geometry))
+        return None, None
+
+    def tool_at(self, x: np.ndarray) -> tuple[PosedTool | None, np.ndarray | None]:
+        """Return the first tool among the interactions, and its own inputs (3 + k,) among x (n,)."""
+        first = 0
+        for interaction in self.interactions:
+            count = len(interaction.ranges(self.body.geometry))
+            if isinstance(interaction, SurfaceTool):
+                return interaction.posed_tool, np.asarray(x[first : first + count])
+            first += count
         return None, None
 
     def __str__(self) -> str:

@@ -10,7 +10,13 @@ from palpate.export.weights_block import WeightsBlock
 
 __all__ = ["core_file", "core_source", "fill_template", "generic_source"]
 
-_BASELINES = ("contact_baseline.c", "pad_baseline.c", "constant_baseline.c", "overlap_baseline.c", "posed_baseline.c")
+_BASELINES = (
+    "contact_baseline.c",
+    "pad_baseline.c",
+    "constant_baseline.c",
+    "overlap_baseline.c",
+    "posed_baseline.c",
+)
 _PART = re.compile(r"@IF (\w+)@\n(.*?)@END@\n", re.DOTALL)
 _MEMORIES = ("relaxation.c", "indentation.c", "iwan_elements.c", "friction.c")
 

@@ -152,7 +152,9 @@ class PartRecord(Record):
     kind: Literal["part"] = "part"
     file: str = Field(min_length=1, description="beside the study file", examples=["part.stl"])
     unit: Literal["m", "dm", "cm", "mm", "um", "in"] | None = Field(
-        None, description="of the file's numbers; STEP and IGES files and scans state their own", examples=["mm"]
+        None,
+        description="of the file's numbers; STEP and IGES files and scans state their own",
+        examples=["mm"],
     )
     element: Metres | None = Field(
         None,

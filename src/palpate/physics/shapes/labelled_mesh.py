@@ -16,7 +16,13 @@ from palpate.errors import UsageError
 from palpate.file_kinds import SCAN_ENDINGS, part_kind
 from palpate.format import millimetres
 from palpate.physics.apart import mesh_apart, read_apart
-from palpate.physics.shapes.body_file import SurfacePatch, apply_patches, digest_of, require_same, tell_repairs
+from palpate.physics.shapes.body_file import (
+    SurfacePatch,
+    apply_patches,
+    digest_of,
+    require_same,
+    tell_repairs,
+)
 from palpate.physics.shapes.label_surface import LabelSurface, label_surface
 from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volumes, to_ngsolve
 from palpate.physics.shapes.mesh_file import refine_mesh
@@ -248,8 +254,10 @@ def _body(
     order = np.argsort(region, kind="stable")
     tetrahedra, region = tetrahedra[order], region[order] - 1
     outer = outer_faces(tetrahedra)
-    key = {tuple(row): int(k) for row, k in zip(
-        np.sort(surface.triangles, axis=1).tolist(), surface.inside, strict=True)}
+    key = {
+        tuple(row): int(k)
+        for row, k in zip(np.sort(surface.triangles, axis=1).tolist(), surface.inside, strict=True)
+    }
     behind = np.array([key.get(tuple(row), 0) for row in np.sort(outer, axis=1).tolist()])
     names = list(image.names)
     present = [k for k in range(len(names)) if (region == k).any()]
@@ -269,7 +277,9 @@ def _body(
 
 def _on_cut(image: LabelImage, places: np.ndarray, spacing: float) -> np.ndarray:
     """Return which places (n, 3) in m lie at the end of the image."""
-    along = (places - image.origin) @ np.linalg.inv(image.axes).T / image.spacing + 0.5  # voxels from its corner
+    along = (places - image.origin) @ np.linalg.inv(
+        image.axes
+    ).T / image.spacing + 0.5  # voxels from its corner
     near = CUT * spacing / image.spacing
     return np.asarray(((along < near) | (along > image.labels.shape - near)).any(axis=1))
 
@@ -289,5 +299,7 @@ def _told(path: str, image: LabelImage, mesh: BodyMesh, spacing: float) -> list[
                 fix=f"Choose smaller ones, such as {millimetres(spacing / 2)}, or leave the label out.",
             )
         if abs(there - wanted) > TELLS * wanted:
-            told.append(f"{said}: elements of {millimetres(spacing)} hold it in part; smaller ones hold more.")
+            told.append(
+                f"{said}: elements of {millimetres(spacing)} hold it in part; smaller ones hold more."
+            )
     return told

@@ -236,7 +236,7 @@ def _shallow(surrogate: Surrogate) -> Surrogate:
 
 
 def _exported(surrogate: Surrogate) -> Surrogate:
-    """Return the body with the fields that the evaluator core knows: none of a tool that turns, or on a curved surface."""
+    """Return the body with the fields that the evaluator core knows, none under a tool that turns."""
     fields = {
         key: field for key, field in surrogate.fields.items() if getattr(field, "contact", None) is None
     }

@@ -1,4 +1,4 @@
-"""A lump as a field against a sharp ball on a mesh that follows it, the same mesh with and without the ball's modulus."""
+"""A lump as a field against a sharp ball on a mesh that follows it, with and without the ball's modulus."""
 
 from __future__ import annotations
 

@@ -91,7 +91,9 @@ class SittingRules(Record):
     break_every: Count = Field(default=40, ge=1)  # trials
     break_seconds: Number = Field(default=60.0, ge=0.0)
     interval_seconds: Number = Field(default=3.0, gt=0.0, le=120.0)  # from first contact
-    pause_seconds: Number = Field(default=0.6, ge=0.0, le=30.0)  # between two intervals
+    pause_seconds: Number = Field(
+        default=1.0, ge=0.5, le=30.0
+    )  # before each interval; it hides a change of body
     depth: Metres | None = Field(default=None, gt=0.0)  # guided; by default half of the trained depth
     limit_minutes: Number = Field(default=45.0, gt=0.0)
 

@@ -30,6 +30,7 @@ BENCHMARKS = (
     "faults",
     "few_rows",
     "filters",
+    "find_lump",
     "hand_drives",
     "heated_plate",
     "latency",

@@ -23,8 +23,14 @@ from palpate.units import bounds
 __all__ = ["energy_with_lumps"]
 
 PLACES = 2400  # of the hand about the lumps, at which f is taken
-UNITS = 160  # for each lump
-WIDTHS = (0.008, 0.012, 0.018)  # m, of which the best is taken: a press is felt over about a contact's width
+# for each lump; the other functions are less smooth than a Gaussian, and take twice as many for the same error
+UNITS = {"gaussian": 160, "inverse-multiquadric": 320, "matern-5/2": 320}
+WIDTHS = (
+    0.008,
+    0.012,
+    0.018,
+    0.027,
+)  # m, of which the best is taken: a press is felt over about a contact's width
 RIDGE = 1e-9  # on squared weights, over the mean square of a unit
 RATIO = 0.02  # share of the largest f below which a place is not about a lump
 
@@ -50,7 +56,7 @@ def energy_with_lumps(energy: LearntEnergy, contrast: LumpContrast, lumps: Seque
     X = _places(energy)
     f, slopes = _log_factor(contrast, felt, X)
     about = np.abs(f) > RATIO * np.abs(f).max()
-    return _with_units(energy, X, f, slopes, X[about], UNITS * len(felt))
+    return _with_units(energy, X, f, slopes, X[about], UNITS[energy.network.radial] * len(felt))
 
 
 def _places(energy: LearntEnergy) -> np.ndarray:

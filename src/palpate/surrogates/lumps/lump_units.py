@@ -80,7 +80,7 @@ def _log_factor(
 def _with_units(
     energy: LearntEnergy, X: np.ndarray, f: np.ndarray, slopes: np.ndarray, about: np.ndarray, units: int
 ) -> LearntEnergy:
-    """Return the energy whose ℓ has units more, which are f (N,) and its slopes (N, 3) at X (N, 3)."""
+    """Return the energy whose ℓ has Gaussians more, which are f (N,) and its slopes (N, 3) at X (N, 3)."""
     centres = _spread(about, min(units, len(about)))
     fits = [_fit(X, f, slopes, centres, width, energy.network.radial) for width in WIDTHS]
     weights, _, width = min(fits, key=lambda fit: fit[1])

@@ -25,6 +25,7 @@ BENCHMARKS = (
     "cantilever",
     "cold_start",
     "device_round_trips",
+    "experiment_plans",
     "export_speed",
     "faults",
     "few_rows",

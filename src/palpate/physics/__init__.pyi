@@ -57,12 +57,14 @@ from .shapes import Dome as Dome
 from .shapes import FineMesh as FineMesh
 from .shapes import Geometry as Geometry
 from .shapes import ImportedMesh as ImportedMesh
+from .shapes import ImportedScan as ImportedScan
 from .shapes import ImportedSolid as ImportedSolid
 from .shapes import Inclusion as Inclusion
 from .shapes import LayeredBlock as LayeredBlock
 from .shapes import Organ as Organ
 from .shapes import SurfacePatch as SurfacePatch
 from .shapes import Tube as Tube
+from .shapes.tool_file import read_tool as read_tool
 from .solid import Body as Body
 from .solid import BodyFamily as BodyFamily
 from .solid import FamilyProblem as FamilyProblem

@@ -12,6 +12,7 @@ __all__ = [
     "CAD_ENDINGS",
     "MESH_ENDINGS",
     "PART_FORMATS",
+    "SCAN_ENDINGS",
     "SURFACE_ENDINGS",
     "file_kind",
     "part_ending",
@@ -31,9 +32,12 @@ MESH_ENDINGS = (
 )
 """Ends of the names of files that hold a volume mesh, which keeps its elements."""
 
+SCAN_ENDINGS = (".nrrd", ".nii", ".mha", ".mhd", ".nhdr")
+"""Ends of the names of files that hold a labelmap of a segmented scan."""
+
 PART_FORMATS = (
-    "a surface (STL, OBJ, PLY, OFF, GLB, VTP), solids (STEP, IGES, BREP), or a volume mesh (VTU, VTK, MSH, INP, BDF, "
-    "MED, XDMF and others), each also as NAME.gz"
+    "a surface (STL, OBJ, PLY, OFF, GLB, VTP), solids (STEP, IGES, BREP), a volume mesh (VTU, VTK, MSH, INP, BDF, "
+    "MED, XDMF and others), each also as NAME.gz, or the labelmap of a scan (NRRD, NIfTI, MHA)"
 )
 """Formats of parts, in words for a message."""
 
@@ -42,7 +46,7 @@ _HEAD = 1024  # bytes in which a legacy VTK file says what it holds
 _TABLES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".parquet", ".npz", ".npy", ".json")
 _KINDS = {
     **dict.fromkeys(_TABLES, "a file of data"),
-    **dict.fromkeys((*SURFACE_ENDINGS, *CAD_ENDINGS, *MESH_ENDINGS), "a part"),
+    **dict.fromkeys((*SURFACE_ENDINGS, *CAD_ENDINGS, *MESH_ENDINGS, *SCAN_ENDINGS), "a part"),
     ".palpate": "a model file",
     ".zarr": "a dataset of solves",
     ".toml": "a study file",
@@ -68,7 +72,7 @@ def part_ending(path: str | os.PathLike[str]) -> str:
 
 
 def part_kind(path: str | os.PathLike[str]) -> str:
-    """Return what a part's file holds: "surface", "cad" or "mesh"; "" for a name that is no part's.
+    """Return what a part's file holds: "surface", "cad", "mesh" or "scan"; "" for a name that is no part's.
 
     Of legacy VTK files, which hold either, the first lines tell it.
     """
@@ -77,7 +81,7 @@ def part_kind(path: str | os.PathLike[str]) -> str:
         opener = gzip.open if Path(path).suffix.lower() == ".gz" else open
         with contextlib.suppress(OSError, EOFError, zlib.error), opener(path, "rb") as file:
             return "surface" if b"POLYDATA" in file.read(_HEAD).upper() else "mesh"
-    kinds = {"surface": SURFACE_ENDINGS, "cad": CAD_ENDINGS, "mesh": MESH_ENDINGS}
+    kinds = {"surface": SURFACE_ENDINGS, "cad": CAD_ENDINGS, "mesh": MESH_ENDINGS, "scan": SCAN_ENDINGS}
     return next((kind for kind, endings in kinds.items() if ending in endings), "")
 
 

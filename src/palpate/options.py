@@ -389,6 +389,19 @@ class PartOptions(Options):
     )
     young: float | None = option(None, "Young's modulus. Default: 10 kPa", "Pa", bare=False)
     poisson: float | None = option(None, "Poisson's ratio. Default: 0.45")
+    labels: str | None = option(
+        None,
+        "tissues of a scan by their numbers, such as fat=1,gland=2,skin=3. Default: all numbers but 0",
+    )
+    materials: str | None = option(
+        None,
+        "material of each region: a name, Young's modulus, or a range of it to be set while it is touched, such as "
+        "'fat=fat,gland=12 kPa,lump=5 kPa..30 kPa'. Default: a tissue of the region's name, else --material",
+    )
+    up: str | None = option(
+        None,
+        "direction of a scan's patient that points up: superior, anterior and so on. Default: superior",
+    )
     radius: float | None = option(
         None, "radius of the ball. Default: by the part's size", "m", above=0, bare=False
     )

@@ -26,6 +26,8 @@ _KEYS = {
     "held": ("body", "fixed"),
     "touched": ("interaction", "touches"),
     "wrap": ("body", "wrap"),
+    "labels": ("body", "labels"),
+    "up": ("body", "up"),
 }
 """Key of a study file that says each option of a part."""
 
@@ -99,7 +101,8 @@ def _choices_of(study: Study) -> dict[str, Any]:
     said: dict[str, Any] = {"depth": acting.depth[1], "touched": acting.touches}
     if isinstance(acting, ProbeRecord):
         said["radius"] = acting.radius
-    said |= {"wrap": body.wrap, "unit": body.unit, "held": body.fixed_names()}
+    said |= {"wrap": body.wrap, "unit": body.unit, "held": body.fixed_names(), "up": body.up}
+    said["labels"] = ",".join(f"{name}={number}" for name, number in body.labels.items())
     said["element"] = getattr(study.sweep, "element", None)
     if isinstance(body.material, str):
         said["material"] = body.material

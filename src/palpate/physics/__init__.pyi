@@ -57,6 +57,7 @@ from .shapes import Dome as Dome
 from .shapes import FineMesh as FineMesh
 from .shapes import Geometry as Geometry
 from .shapes import ImportedMesh as ImportedMesh
+from .shapes import ImportedScan as ImportedScan
 from .shapes import ImportedSolid as ImportedSolid
 from .shapes import Inclusion as Inclusion
 from .shapes import LayeredBlock as LayeredBlock
@@ -67,6 +68,7 @@ from .shapes.tool_file import read_tool as read_tool
 from .solid import Body as Body
 from .solid import BodyFamily as BodyFamily
 from .solid import FamilyProblem as FamilyProblem
+from .solid import LumpProblem as LumpProblem
 from .solid import SolidProblem as SolidProblem
 from .solid import SolidSolution as SolidSolution
 from .solid import Varied as Varied

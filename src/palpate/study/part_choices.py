@@ -21,9 +21,10 @@ from palpate.record_complaints import complaints
 from palpate.study.material_records import SolidMaterialRecord
 from palpate.study.part_records import PartRecord
 from palpate.study.part_rim import with_rim
-from palpate.study.part_study import HELD, TOUCHED, require_suitable_ball
+from palpate.study.part_study import HELD, POISSON, TOUCHED, require_suitable_ball
 from palpate.study.part_tools import under_ball, under_tool
 from palpate.study.probe_kind import ProbeRecord
+from palpate.study.region_choices import RegionMaterial, material_texts
 from palpate.study.study import Study
 from palpate.study.tool_kind import ToolRecord
 
@@ -61,6 +62,7 @@ def shown_part(study: Study) -> ShownPart:
             young=plain.young if plain and plain.young else 10e3,
             poisson=plain.poisson if plain else 0.45,
             depth=acting.depth[1],
+            regions=_region_texts(study, body),
             **_shown_tool(acting),
         ),
         units=tuple(UNITS) if body.unit else (),
@@ -68,7 +70,19 @@ def shown_part(study: Study) -> ShownPart:
         materials={name: _shown_material(name) for name in MATERIALS if _is_for_solids(name)},
         laws=LAWS,
         notes=tuple(bare.notes),
+        judge_region=judge_region,
     )
+
+
+def judge_region(region: str, text: str) -> RegionMaterial:
+    """Return the material of a region by its text, or refuse the text."""
+    return RegionMaterial.of_text(region, text, POISSON)
+
+
+def _region_texts(study: Study, body: PartRecord) -> dict[str, str]:
+    """Return the materials of a part's regions as texts; nothing of a part of one region."""
+    regions = body.bare().regions
+    return material_texts(body.materials, study.varied, regions) if len(regions) > 1 else {}
 
 
 def chosen_study(study: Study, choices: PartChoices) -> Study:
@@ -92,6 +106,7 @@ def chosen_study(study: Study, choices: PartChoices) -> Study:
         "fixed": fixed,
         "material": _material(body, choices),
     }
+    _choose_regions(content, _region_texts(study, body), choices)
     content["interaction"] |= {"touches": touches, "depth": (least, choices.depth)}
     if choices.posed is None:
         content = under_ball(content, choices.radius)
@@ -101,6 +116,22 @@ def chosen_study(study: Study, choices: PartChoices) -> Study:
         return with_rim(Study.model_validate(content))
     except ValidationError as error:
         raise UsageError(" ".join(complaints(error, Study)), fix="Change it on the page.") from error
+
+
+def _choose_regions(content: dict[str, Any], before: dict[str, str], choices: PartChoices) -> None:
+    """Change the materials of regions in a study's content, and what varies of them, where texts have changed."""
+    materials = dict(content["body"]["materials"])
+    for region, text in choices.regions.items():
+        if region not in before or text == before[region]:
+            continue
+        path = f"{region}.young"
+        content["varied"] = [entry for entry in content["varied"] if entry["path"] != path]
+        materials.pop(region, None)
+        if text:
+            chosen = judge_region(region, text)
+            materials[region] = chosen.table
+            content["varied"] += [chosen.varied] if chosen.varied else []
+    content["body"]["materials"] = materials
 
 
 def _shown_tool(acting: ProbeRecord | ToolRecord) -> dict[str, Any]:

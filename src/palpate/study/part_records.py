@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, ClassVar, Literal
+from types import MappingProxyType
+from typing import Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
 
 from palpate.errors import UsageError
 from palpate.file_kinds import part_kind
-from palpate.physics import Body, ImportedMesh, ImportedSolid, SurfacePatch
+from palpate.physics import Body, ImportedMesh, ImportedScan, ImportedSolid, SurfacePatch
 from palpate.physics.shapes.body_file import FEATURE_ANGLE, WITHIN
 from palpate.physics.shapes.naming import require_name
 from palpate.physics.shapes.triangle_list import read_triangles
@@ -28,6 +30,8 @@ _DIRECTIONS: dict[str, tuple[float, float, float]] = {
     },
 }
 Corner = tuple[Metres, Metres, Metres]
+PartShape: TypeAlias = ImportedSolid | ImportedMesh | ImportedScan
+UPWARD = "superior"  # as a scan's file has it
 
 
 class PartSurfaceRecord(Record):
@@ -141,19 +145,19 @@ class PartSurfaceRecord(Record):
 
 
 class PartRecord(Record):
-    """A part from a file: a surface such as STL or OBJ, CAD such as STEP, or a volume mesh such as VTU, MSH or INP."""
+    """A part from a file: a surface such as STL, CAD such as STEP, a volume mesh such as VTU, or the labelmap of a scan."""
 
     INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "tool", "pad")
 
     kind: Literal["part"] = "part"
     file: str = Field(min_length=1, description="beside the study file", examples=["part.stl"])
     unit: Literal["m", "dm", "cm", "mm", "um", "in"] | None = Field(
-        None, description="of the file's numbers; STEP and IGES files state their own", examples=["mm"]
+        None, description="of the file's numbers; STEP and IGES files and scans state their own", examples=["mm"]
     )
     element: Metres | None = Field(
         None,
         gt=0,
-        description="largest element, where none touches; a mesh keeps its own",
+        description="largest element, where none touches, of a scan that of its surfaces; a mesh keeps its own",
         examples=["15 mm"],
     )
     feature_angle: Number | None = Field(
@@ -168,6 +172,16 @@ class PartRecord(Record):
         gt=0,
         description="surfaces that cut themselves or have holes: a closed one is laid around, so far away at most",
         examples=["1 mm"],
+    )
+    labels: dict[str, int] = Field(
+        default_factory=dict,
+        description="scans: names of the numbers that belong to the body; left out: all but 0",
+        examples=[{"fat": 1, "gland": 2}],
+    )
+    up: Literal["superior", "inferior", "anterior", "posterior", "left", "right"] | None = Field(
+        None,
+        description="scans: direction of the patient that points up; left out: superior",
+        examples=["anterior"],
     )
     material: SolidMaterial | None = Field(
         None, description="of each region that `materials` doesn't name", examples=["ecoflex 00-30"]
@@ -188,6 +202,10 @@ class PartRecord(Record):
             raise ValueError(
                 f"{self.file} is a CAD file: its surfaces can't be chosen by what they are around"
             )
+        if kind == "scan" and self.unit is not None:
+            raise ValueError(f"{self.file} is a scan and states its lengths: leave out unit")
+        if kind != "scan" and (self.labels or self.up):
+            raise ValueError("labels and up are for scans, such as NRRD files")
         if self.element is not None and kind == "mesh":
             raise ValueError(f"{self.file} is a mesh and keeps its elements: leave out element")
         if self.feature_angle is not None and kind != "surface":
@@ -218,14 +236,25 @@ class PartRecord(Record):
         """Return the names of the surfaces that are fixed."""
         return (self.fixed,) if isinstance(self.fixed, str) else self.fixed
 
-    def shape(self) -> ImportedSolid | ImportedMesh:
+    def shape(self) -> PartShape:
         """Return the shape, with names for parts of its surface."""
-        patches = self.patches()
-        return part_shape(self.file, self.unit, self.element, self.feature_angle, patches, self.wrap)
+        return self._shape(self.patches())
 
-    def bare(self) -> ImportedSolid | ImportedMesh:
+    def bare(self) -> PartShape:
         """Return the shape with the names of its file alone."""
-        return part_shape(self.file, self.unit, self.element, self.feature_angle, wrap=self.wrap)
+        return self._shape(())
+
+    def _shape(self, patches: tuple[SurfacePatch, ...]) -> PartShape:
+        return part_shape(
+            self.file,
+            self.unit,
+            self.element,
+            self.feature_angle,
+            patches,
+            self.wrap,
+            self.labels,
+            self.up,
+        )
 
     def patches(self) -> tuple[SurfacePatch, ...]:
         """Return the names for parts of the surface, in the order in which they are given: later ones go over."""
@@ -254,13 +283,18 @@ def part_shape(
     feature_angle: float | None = None,
     patches: tuple[SurfacePatch, ...] = (),
     wrap: float | None = None,
-) -> ImportedSolid | ImportedMesh:
-    """Return the shape of a part's file: a solid of CAD or a surface, else a volume mesh.
+    labels: Mapping[str, int] = MappingProxyType({}),
+    up: str | None = None,
+) -> PartShape:
+    """Return the shape of a part's file: a solid of CAD or a surface, the tissues of a scan, else a volume mesh.
 
     STEP and IGES files state the unit of their numbers, a mesh is in m by default. `element` is the largest element in
     m, of a solid or a surface; `feature_angle` is in degrees, from which on an edge of a surface is sharp. The patches
-    are names for parts of the surface; `wrap` is the size in m by which a surface is wrapped.
+    are names for parts of the surface; `wrap` is the size in m by which a surface is wrapped. Of a scan
+    `labels` are names and numbers of its tissues, and `up` is the direction of the patient that becomes z.
     """
+    if part_kind(file) == "scan":
+        return ImportedScan(file, labels, element, up or UPWARD, patches)
     if part_kind(file) not in ("cad", "surface"):
         return ImportedMesh(file, unit or "m", patches)
     angle = FEATURE_ANGLE if feature_angle is None else feature_angle

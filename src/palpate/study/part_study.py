@@ -17,12 +17,14 @@ from palpate.file_kinds import PART_FORMATS, part_ending, part_kind, way_for
 from palpate.format import millimetres
 from palpate.options import PartOptions, takes
 from palpate.physics.shapes.cad_file import states_unit
+from palpate.physics.shapes.labelled_mesh import CUT_FACE
 from palpate.physics.shapes.mesh import BodyMesh, Face
 from palpate.record_complaints import complaints
-from palpate.study.part_records import PartRecord, part_shape
+from palpate.study.part_records import PartRecord, PartShape, part_shape
 from palpate.study.part_rim import with_rim
 from palpate.study.part_tools import COARSE, tool_depth, under_tool
 from palpate.study.probe_kind import ProbeRecord
+from palpate.study.region_choices import read_labels, region_materials
 from palpate.study.study import Study
 from palpate.study.toml import to_toml
 from palpate.tools.tool_sizes import BALL, read_tool, sizes_of
@@ -72,7 +74,12 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
             why=f"Its name ends in {part_ending(path) or 'nothing'}.",
             fix=f"Give {PART_FORMATS}. {way_for(path)}".strip(),
         )
-    unit, faces = _read(path, options.unit, options.wrap)
+    is_scan, labels = part_kind(path) == "scan", read_labels(options.labels)
+    if not is_scan and (labels or options.up):
+        raise UsageError(
+            f"--labels and --up are for scans, and {path} is none.", fix="Leave them out, or name a labelmap."
+        )
+    unit, faces = _read_scan(path, labels, options) if is_scan else _read(path, options.unit, options.wrap)
     low = np.min([face.lower for face in faces], axis=0)
     high = np.max([face.upper for face in faces], axis=0)
     footprint = float(np.prod((high - low)[:2]))
@@ -92,6 +99,8 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
             "file": str(path),
             "unit": unit,
             "wrap": options.wrap,
+            "labels": labels,
+            "up": options.up,
             "material": _material(options),
             "fixed": fixed,
             "surfaces": named,
@@ -105,6 +114,13 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
         "sweep": {"samples": 60, "depths": 3, "element": element},
         "test": {"samples": 24, "depths": 2},  # many places: several depths of one tell less
     }
+    if is_scan:  # its surfaces are as fine as what lies under the ball, and are round there
+        content["body"]["element"] = element
+    regions = _shape_of(content["body"]).regions
+    poisson = POISSON if options.poisson is None else options.poisson
+    materials = region_materials(options.materials, regions, poisson)
+    content["body"]["materials"] = {name: entry.table for name, entry in materials.items()}
+    content["varied"] = [entry.varied for entry in materials.values() if entry.varied]
     study = _study_of(content) if touched else _with_touched(content, named)
     assert isinstance(study.body, PartRecord)
     chosen = {name: length for name in ("radius", "depth") if (length := getattr(options, name)) is not None}
@@ -115,13 +131,12 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     study = with_rim(study)
     if options.tool is not None:
         study = with_tool(study, options)
-    regions = study.body.shape().regions  # type: ignore[union-attr]  # it is a part
     return study, tuple(_notes(path, unit, faces, regions, low, high))
 
 
 def with_tool(study: Study, options: PartOptions) -> Study:
     """Return the study of a part under the tool of the options, in place of the ball that suits the part."""
-    from palpate.viewer.shown_part import require_room_for_tool
+    from palpate.viewer.shown_part import require_room_for_tool, require_round_edge
 
     body, ball = study.body, study.interaction
     assert isinstance(body, PartRecord)
@@ -136,7 +151,10 @@ def with_tool(study: Study, options: PartOptions) -> Study:
         )
     low, high = body.bare().skin.corners
     require_room_for_tool(tool, high - low)
+    require_round_edge(tool)
     content = under_tool(study.model_dump(), name, tool)
+    if options.element not in (None, AUTO):  # as somebody wants it
+        content["sweep"]["element"] = parse_quantity(options.element, "m", "--element", bare=False)
     if options.depth is None:
         deepest = tool_depth(tool.shape, ball.depth[1])
         content["interaction"]["depth"] = (_nice(LEAST_DEPTH * deepest), deepest)
@@ -296,8 +314,24 @@ def _read(path: Path, unit: str | None, wrap: float | None) -> tuple[str | None,
     )
 
 
+def _read_scan(path: Path, labels: dict[str, int], options: PartOptions) -> tuple[None, Sequence[Face]]:
+    """Return no unit, which a scan states, and the faces of its tissues."""
+    if options.unit is not None:
+        raise UsageError(f"{path} is a scan and states its lengths.", fix="Leave --unit out.")
+    element = None if options.element in {None, AUTO} else parse_quantity(str(options.element), "m", "--element")
+    return None, part_shape(str(path), element=element, labels=labels, up=options.up).faces
+
+
+def _shape_of(body: Mapping[str, Any]) -> PartShape:
+    """Return the shape of a body's table, with the names of its file."""
+    names = ("file", "unit", "element", "wrap", "labels", "up")
+    return part_shape(**{name: body[name] for name in names if body.get(name) is not None})
+
+
 def _support(faces: Sequence[Face], low: float, height: float) -> tuple[str | tuple[str, ...], list[Any]]:
     """Return what is fixed, and the surfaces that this needs names for."""
+    if any(face.name == CUT_FACE for face in faces):  # where a scan ends, the rest of the patient holds it
+        return CUT_FACE, []
     below = [f for f in faces if f.normal[2] < -FLAT and f.upper[2] < low + LEVEL * height]
     lower, upper = (
         np.array(pick([getattr(f, end) for f in faces], axis=0))

@@ -38,6 +38,7 @@ __all__ = [
     "PartNews",
     "Picks",
     "Ready",
+    "RegionInfo",
     "Role",
     "SizeInfo",
     "StartWish",
@@ -149,6 +150,14 @@ class ToolInfo:
 
 
 @dataclass(frozen=True)
+class RegionInfo:
+    """A region of a part of several, and its material as it can be typed."""
+
+    name: str
+    material: str  # its name, a Young's modulus or a range of it; empty: that of the whole part
+
+
+@dataclass(frozen=True)
 class PartNews(Json):
     """The stage of the work on a part, server to page."""
 
@@ -175,6 +184,7 @@ class PartFacts(Json):
     materials: tuple[MaterialInfo, ...]  # that can be asked for by name
     laws: tuple[str, ...]  # that take Young's modulus and Poisson's ratio
     tools: tuple[ToolInfo, ...]  # that can press it
+    regions: tuple[RegionInfo, ...]  # of a part of several; none of others
     choices: Mapping[str, str]  # made so far, as texts with units, by the names of `StartWish`
     notes: tuple[str, ...]  # what else there is to say, in sentences
 
@@ -192,6 +202,8 @@ class StartWish(Json):
     trial: bool = False  # whether the choices are judged only, and nothing begins
     tool: str = "ball"  # what presses, by the name of a `ToolInfo`
     sizes: Mapping[str, str] = field(default_factory=dict)  # of a tool that is no ball, by their names
+    # materials of regions by their names, as texts: a name, a Young's modulus or a range of it; empty: `material`
+    regions: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -213,7 +225,8 @@ class Answer(Json):
     """The answer to a wish, server to page: problems in sentences, or none where all fits."""
 
     problem: str  # of the whole; empty where there is none
-    # problems of single choices, by the names of `StartWish`; of sizes by ``size-`` and theirs; null: none of them was judged
+    # problems of single choices, by the names of `StartWish`; of sizes by ``size-`` and theirs, of regions by
+    # ``region-`` and their numbers; null: none was judged
     fields: Mapping[str, str] | None = None
     trial: bool = False  # whether the wish was one on trial
     tool: DrawnTool | None = None  # the tool that was wished for, to be drawn

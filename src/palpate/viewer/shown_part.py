@@ -7,7 +7,7 @@ PartChoices  what a person has chosen
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -33,6 +33,7 @@ from palpate.viewer.part_messages import (
     MaterialInfo,
     PartFaces,
     PartFacts,
+    RegionInfo,
     Role,
     SizeInfo,
     StartWish,
@@ -49,6 +50,7 @@ __all__ = [
     "error_line",
     "require_room",
     "require_room_for_tool",
+    "require_round_edge",
     "wished_tool",
 ]
 
@@ -75,6 +77,7 @@ class PartChoices:
     touched: np.ndarray | None = None  # (k,) int, triangles; None: as chosen at first
     tool: str = BALL  # what presses, by name
     posed: PosedTool | None = None  # the tool; None for a ball
+    regions: Mapping[str, str] = field(default_factory=dict)  # materials as texts; "": that of the whole part
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,8 @@ class ShownPart:
     materials: Mapping[str, ShownMaterial] = field(default_factory=dict)  # by name
     laws: tuple[str, ...] = ("neo-hookean",)  # that take Young's modulus and Poisson's ratio
     notes: tuple[str, ...] = ()  # what else to say of the file, in sentences
+    # refuses a text that is no material of a region, by the region's name
+    judge_region: Callable[[str, str], object] = field(default=lambda region, text: None)
 
     @cached_property
     def surface(self) -> Surface:
@@ -140,6 +145,18 @@ class ShownPart:
                 problems[name] = error_line(error)
         if wish.tool != BALL:
             problems |= _size_problems(wish, self.size)
+        return problems | self._region_problems(wish)
+
+    def _region_problems(self, wish: StartWish) -> dict[str, str]:
+        """Return what is wrong with the materials of regions, by ``region-`` and the region's number."""
+        problems: dict[str, str] = {}
+        for number, (name, first) in enumerate(self.choices.regions.items()):
+            text = wish.regions.get(name, first)
+            if text not in {"", first}:  # what was there stays, whatever law it has
+                try:
+                    self.judge_region(name, text)
+                except UsageError as error:
+                    problems[f"region-{number}"] = error_line(error)
         return problems
 
     def facts(self) -> PartFacts:
@@ -167,6 +184,7 @@ class ShownPart:
             ),
             laws=self.laws,
             tools=_tools(self.choices),
+            regions=tuple(RegionInfo(name, text) for name, text in self.choices.regions.items()),
             choices={
                 name: getattr(wish, name)
                 for name in ("material", "law", "young", "poisson", "radius", "depth", "tool")
@@ -186,6 +204,7 @@ def as_wish(choices: PartChoices) -> StartWish:
         depth=f"{choices.depth * 1e3:.6g} mm",
         tool=choices.tool,
         sizes={} if choices.posed is None else _size_texts(choices.posed),
+        regions=choices.regions,
     )
 
 
@@ -203,6 +222,7 @@ def choices_of(wish: StartWish, held: np.ndarray | None, touched: np.ndarray | N
         touched=touched,
         tool=wish.tool,
         posed=None if wish.tool == BALL else wished_tool(wish),
+        regions=wish.regions,
     )
 
 
@@ -213,7 +233,7 @@ def wished_tool(wish: StartWish) -> PosedTool:
 
 
 def _size_problems(wish: StartWish, room: np.ndarray) -> dict[str, str]:
-    """Return what is wrong with the sizes of a tool on a part of a size (3,) in m, in sentences by ``size-`` and their names."""
+    """Return what is wrong with the sizes of a tool on a part of a size (3,) in m, by ``size-`` and their names."""
     problems: dict[str, str] = {}
     for key, text in wish.sizes.items():
         try:

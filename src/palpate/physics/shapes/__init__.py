@@ -9,6 +9,8 @@ solid_file  a body from a CAD file or a closed surface; cad_file reads solids, d
             surface_wrap lays a closed one around what cuts itself
 mesh_file   a body from a volume mesh; mesh_source reads it, abaqus_file, gmsh_file, vtk_file some forms; mesh_groups
             has its cells and their names, mesh_cells splits them into tetrahedra
+labelled_mesh a body of several tissues from a segmented scan; scan_file reads its labels, label_surface makes the
+            surfaces between them
 packed_file files as they lie on the disk: packed, of any case, and whether their heads can be true
 body_file   files of bodies: unit, content, names for parts of their surface
 shape       what every shape offers, and its rotations and reflections
@@ -21,6 +23,7 @@ from palpate.physics.shapes.block import Block, LayeredBlock
 from palpate.physics.shapes.body_file import SurfacePatch
 from palpate.physics.shapes.cylinder import Cylinder, Tube
 from palpate.physics.shapes.dome import Dome, Inclusion
+from palpate.physics.shapes.labelled_mesh import ImportedScan
 from palpate.physics.shapes.mesh import BodyMesh, Face, MeshQuality, body_mesh, to_ngsolve
 from palpate.physics.shapes.mesh_file import ImportedMesh
 from palpate.physics.shapes.meshing import FineMesh
@@ -37,6 +40,7 @@ __all__ = [
     "FineMesh",
     "Geometry",
     "ImportedMesh",
+    "ImportedScan",
     "ImportedSolid",
     "Inclusion",
     "LayeredBlock",

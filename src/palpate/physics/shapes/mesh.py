@@ -205,7 +205,8 @@ def body_mesh(mesh: Any, surfaces: tuple[str, ...] = (), regions: tuple[str, ...
         skin["nodes"][:, :3].astype(np.int64) - 1, skin["index"].astype(np.int64) - 1, triangles
     )
     outer, surface_of = _compact([*names, UNNAMED], number, surfaces)
-    materials = [netgen.GetMaterial(i + 1) for i in range(netgen.GetNDomains())]
+    # Netgen counts regions by the faces around them, of which one within another has none in `to_ngsolve`
+    materials = [netgen.GetMaterial(i + 1) for i in range(int(solid["index"].max(initial=0)))]
     inner, region_of = _compact(materials, solid["index"].astype(np.int64) - 1, regions)
     return BodyMesh(points, tetrahedra, triangles, surface_of, region_of, outer, inner)
 

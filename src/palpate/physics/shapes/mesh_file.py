@@ -37,7 +37,7 @@ from palpate.physics.shapes.surface_repair import place
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-__all__ = ["ImportedMesh"]
+__all__ = ["ImportedMesh", "refine_mesh"]
 
 PLURAL = {"hexahedron": "hexahedra", "wedge": "wedges", "pyramid": "pyramids"}
 
@@ -118,10 +118,11 @@ class ImportedMesh(Shape):
         """The file's mesh, its tetrahedra bisected where a refinement asks for smaller ones."""
         if not refinements:
             return to_ngsolve(_read(self)[0]).ngmesh
-        return mesh_apart(_refine, _read(self)[0], refinements, doing=f"refining the {self}")
+        return mesh_apart(refine_mesh, _read(self)[0], refinements, doing=f"refining the {self}")
 
 
-def _refine(bare: BodyMesh, refinements: tuple[FineMesh, ...]) -> Any:
+def refine_mesh(bare: BodyMesh, refinements: tuple[FineMesh, ...]) -> Any:
+    """Return the `netgen.meshing.Mesh` of a body, bisected behind parts of surfaces."""
     mesh = to_ngsolve(bare)
     for refinement in refinements:
         _bisect(mesh, refinement)

@@ -60,6 +60,7 @@ export interface Line {
 export interface DrawnTool {
   words: string;
   centre: Vec3;
+  shift: Vec3;
   points: number[];
   normals: number[];
   triangles: number[];
@@ -102,6 +103,12 @@ export interface ToolInfo {
   sizes: SizeInfo[];
 }
 
+/** A region of a part of several, and its material as it can be typed. */
+export interface RegionInfo {
+  name: string;
+  material: string;
+}
+
 /** A place that a person has marked on the skin, m, or one that practice shows. */
 export interface ExamMark {
   number: number;
@@ -130,6 +137,7 @@ export interface Hello {
   radius: number;
   radius_parameter: number;
   tool: DrawnTool | null;
+  twists: boolean;
   deepest: number;
   force_max: number;
   stiffness_max: number;
@@ -214,6 +222,7 @@ export interface PartFacts {
   materials: MaterialInfo[];
   laws: string[];
   tools: ToolInfo[];
+  regions: RegionInfo[];
   choices: Record<string, unknown>;
   notes: string[];
 }
@@ -229,6 +238,7 @@ export interface StartWish {
   trial: boolean;
   tool: string;
   sizes: Record<string, unknown>;
+  regions: Record<string, unknown>;
 }
 
 /** The wish that the numbers of the file are taken in another unit, page to server. */
@@ -366,6 +376,8 @@ export interface Frame {
   position: Vec3;
   /** N, on the hand */
   force: Vec3;
+  /** N m, on a tool about its place; zero where none is told */
+  torque: Vec3;
   /** Hz, ticks per second achieved */
   rate: number;
   /** s, the latest tick since the frame before, to a quarter of itself */
@@ -427,6 +439,7 @@ const FRAME_LAYOUT: Layout = [
   ["echo", "f64"],
   ["position", "vec3"],
   ["force", "vec3"],
+  ["torque", "vec3"],
   ["rate", "f32"],
   ["lateness", "f32"],
   ["lateness_p50", "f32"],

@@ -11,6 +11,14 @@ const FIXED: Record<string, string> = { young: "young", poisson: "poisson", radi
 const KINDS = { tissue: "tissues", silicone: "silicones", other: "others" } as const;
 const BALL = "ball";
 
+/** A label, and the box of a text that it is for. */
+function labelled(id: string, words: string): [HTMLLabelElement, HTMLInputElement] {
+  const [label, box] = [worded("label", words) as HTMLLabelElement, document.createElement("input")];
+  [box.id, box.type, box.autocomplete, box.spellcheck] = [id, "text", "off", false];
+  label.htmlFor = id;
+  return [label, box];
+}
+
 export class PartForm {
   /** Hears of another tool, or another size of it, that can be drawn. */
   reshaped: () => void = () => {};
@@ -40,6 +48,7 @@ export class PartForm {
       this.resize();
       this.ask();
     });
+    this.listRegions();
     this.show();
     this.resize();
     if (choices.tool !== BALL) this.ask(); // what it looks like
@@ -52,7 +61,9 @@ export class PartForm {
     const [young, poisson] = [value("young"), value("poisson")];
     const [radius, depth] = [value("ball-radius"), value("ball-depth")];
     const sizes = Object.fromEntries(this.tool.sizes.map(({ name }) => [name, value(`size-${name}`)]));
-    return { material: value("material"), law: value("law"), young, poisson, radius, depth, trial, tool: this.tool.name, sizes };
+    const regions = Object.fromEntries(this.facts.regions.map(({ name }, i) => [name, value(`region-${i}`).trim()]));
+    const material = { material: value("material"), law: value("law"), young, poisson, regions };
+    return { ...material, radius, depth, trial, tool: this.tool.name, sizes };
   }
 
   /** Say beside the fields what is wrong with their numbers; with `all`, of those too in which a person still writes. */
@@ -105,6 +116,20 @@ export class PartForm {
     select.value = chosen;
   }
 
+  /** A field for the material of each region of a part that has several. */
+  private listRegions(): void {
+    const { regions, materials } = this.facts;
+    element("regions").hidden = !regions.length;
+    element("region-materials").replaceChildren(...materials.map(({ name }) => new Option(name, name)));
+    const fields = regions.flatMap(({ name }, i) => labelled(`region-${i}`, name));
+    document.querySelector("#regions .form")!.replaceChildren(...fields);
+    regions.forEach(({ material }, i) => {
+      this.boxes.set(`region-${i}`, `region-${i}`);
+      this.prepare(`region-${i}`, material);
+      input(`region-${i}`).setAttribute("list", "region-materials");
+    });
+  }
+
   /** The fields of the tool that is chosen, which begin with sizes that suit the part. */
   private resize(): void {
     const { tool } = this;
@@ -114,15 +139,10 @@ export class PartForm {
     }
     element("tool-about").textContent = tool.about;
     element("tool-about").hidden = ball;
-    for (const field of [...this.boxes.keys()]) if (!(field in FIXED)) this.boxes.delete(field);
+    for (const field of [...this.boxes.keys()]) if (field.startsWith("size-")) this.boxes.delete(field);
     element("tool-sizes").hidden = ball;
     element("tool-sizes").replaceChildren(
-      ...tool.sizes.flatMap(({ name, words }) => {
-        const [label, box] = [worded("label", words) as HTMLLabelElement, document.createElement("input")];
-        [box.id, box.type, box.autocomplete, box.spellcheck] = [`size-${name}`, "text", "off", false];
-        label.htmlFor = box.id;
-        return [label, box];
-      }),
+      ...tool.sizes.flatMap(({ name, words }) => labelled(`size-${name}`, words)),
     );
     for (const { name, value } of tool.sizes) {
       this.boxes.set(`size-${name}`, `size-${name}`);
@@ -144,7 +164,7 @@ export class PartForm {
     box.addEventListener("input", () => {
       this.draw();
       if (box.getAttribute("aria-invalid") !== "true") this.left.delete(field);
-      if (box.getAttribute("aria-invalid") === "true" || !(field in FIXED)) this.ask(PAUSE);
+      if (box.getAttribute("aria-invalid") === "true" || field.startsWith("size-")) this.ask(PAUSE);
     });
     box.addEventListener("change", () => {
       this.left.add(field);

@@ -1,0 +1,266 @@
+"""The surfaces between the labels of a labelmap, as triangles that fit together where three tissues meet.
+
+Labels are smoothed and sampled on a lattice of the elements' size. Each cube of the lattice that holds two labels has a
+vertex, and each pair of neighbours with different labels four triangles' corners around it (surface nets, Gibson 1998,
+Constrained elastic surface nets, MERL TR99-24). A vertex is then moved to where the smoothed indicators of the cube's
+labels are equal, within its cube; a small addition to each indicator makes the flat triangles enclose its voxels'
+volume.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from typing import Any
+
+import numpy as np
+
+from palpate.physics.shapes.scan_file import LabelImage
+
+__all__ = ["LabelSurface", "label_surface"]
+
+# standard deviation of the smoothing, in voxels against steps, and in the lattice's spacings against gaps of sampling
+SMOOTH_VOXEL, SMOOTH_LATTICE = 0.85, 0.35
+EVEN, EXACT = 8, 8  # rounds that spread the vertices and step back to the surface, and of these steps alone
+MOST_SHIFT = 0.1  # of the lattice's spacing: how far surfaces move in a round to keep a volume
+WITHIN = 0.45  # of the lattice's spacing: a vertex stays in its cube, so that surfaces don't cut each other
+STEP = 0.05  # of the lattice's spacing, in the difference quotient of an indicator
+FLAT = 1e-3  # change of an indicator along one spacing below which it has no direction
+CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class LabelSurface:
+    """The surfaces between labels.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        Corners of the triangles, m.
+    triangles : (t, 3) int array
+        Counter-clockwise as seen from the side of `outside`.
+    inside, outside : (t,) int arrays
+        Number of the label on either side: 0 is no body, k the k-th name of the image.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    inside: np.ndarray
+    outside: np.ndarray
+
+
+def label_surface(image: LabelImage, spacing: float) -> LabelSurface:
+    """Return the surfaces between the labels of an image, with triangles of about `spacing` in m."""
+    lattice = _Lattice(image, spacing)
+    cells = lattice.cells()
+    cube = np.full(np.array(cells.shape) - 1, -1)
+    corner = np.stack([cells[tuple(slice(c, c + n) for c, n in zip(k, cube.shape, strict=True))] for k in CORNERS], -1)
+    mixed = np.argwhere((corner != corner[..., :1]).any(axis=-1))
+    cube[tuple(mixed.T)] = np.arange(len(mixed))
+    corner = corner[tuple(mixed.T)]
+    quads, sides = _quads(cells, cube)
+    places = _settle(lattice, mixed + 0.5, corner, quads, sides)
+    triangles = _halve(places, quads)
+    first, second = np.repeat(sides[:, 0], 2), np.repeat(sides[:, 1], 2)
+    swap = first == 0  # the body lies inside
+    triangles[swap] = triangles[swap][:, ::-1]
+    inside, outside = np.where(swap, second, first), np.where(swap, first, second)
+    if np.linalg.det(image.axes) < 0:
+        triangles = triangles[:, ::-1]
+    return LabelSurface(lattice.to_metres(places), triangles, inside, outside)
+
+
+class _Lattice:
+    """Smoothed indicators of the labels on a lattice along the voxels' axes."""
+
+    def __init__(self, image: LabelImage, spacing: float) -> None:
+        self.image, self.spacing = image, spacing
+        used = np.argwhere(image.labels > 0)
+        low, high = used.min(axis=0), used.max(axis=0) + 1
+        # two more points around the body, in all directions, where nothing is
+        counts = np.ceil((high - low) * image.spacing / spacing).astype(int) + 6
+        middle = ((low + high) / 2 - 0.5) * image.spacing  # m along the axes from the first voxel's centre
+        self.first = middle - (counts - 1) / 2 * spacing
+        part = image.labels[tuple(slice(a, b) for a, b in zip(low, high, strict=True))]
+        weights = [
+            _weights(self.first[d] + spacing * np.arange(counts[d]), (low[d] + np.arange(part.shape[d])) * image.spacing[d],
+                     math.hypot(SMOOTH_VOXEL * image.spacing[d], SMOOTH_LATTICE * spacing), image.spacing[d])
+            for d in range(3)
+        ]
+        shares = [
+            np.einsum("ai,bj,ck,ijk->abc", *weights, (part == number).astype(np.float32), optimize=True)
+            for number in image.names.values()
+        ]
+        self.shares = np.stack([1.0 - np.sum(shares, axis=0), *shares]).astype(float)
+        from scipy.ndimage import spline_filter
+
+        self.volumes = [volume / spacing**3 for volume in image.volumes.values()]
+        self.bias = np.zeros(len(self.shares))  # added to each share
+        # how fast the difference of two shares changes across a plane between them, along one spacing
+        deviation = math.hypot(SMOOTH_VOXEL * image.spacing.max() / spacing, SMOOTH_LATTICE)
+        self.slope = 2 * (2 - math.sqrt(0.5)) / (math.sqrt(2 * math.pi) * deviation)
+        self.splines = [spline_filter(share, order=3) for share in self.shares]
+
+    def cells(self) -> np.ndarray:
+        """Return the label with the largest share at each point, (a, b, c) int; edges that are shared by four surfaces
+        are removed."""
+        return _thicken(np.asarray(self.shares.argmax(axis=0)))
+
+    def at(self, label: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Return the share of a label (n,) at places (n, 3) in steps of the lattice."""
+        from scipy.ndimage import map_coordinates
+
+        value = np.empty(len(places))
+        for number, spline in enumerate(self.splines):
+            mine = label == number
+            if mine.any():
+                value[mine] = map_coordinates(spline, places[mine].T, order=3, prefilter=False, mode="nearest")
+        return value
+
+    def keep_volumes(self, places: np.ndarray, quads: np.ndarray, sides: np.ndarray) -> None:
+        """Change the additions to the shares so that each label comes nearer to the volume of its voxels.
+
+        The surfaces have corners `quads` (q, 4) at places (n, 3), and the labels (q, 2) on their sides.
+        """
+        a, b, c, d = (places[k] for k in quads.T)
+        area = np.cross(c - a, d - b) / 2
+        flow = np.einsum("qi,qi->q", area, (a + b + c + d) / 4) / 3  # divergence theorem
+        size = np.linalg.norm(area, axis=1)
+        for number, wanted in enumerate(self.volumes, 1):
+            one, other = sides[:, 0] == number, sides[:, 1] == number
+            volume = flow[one].sum() - flow[other].sum()
+            shift = (wanted - volume) / max(size[one | other].sum(), 1e-9)  # in steps of the lattice
+            self.bias[number] += np.clip(shift, -MOST_SHIFT, MOST_SHIFT) * self.slope
+
+    def to_metres(self, places: np.ndarray) -> np.ndarray:
+        """Return where places (n, 3) in steps of the lattice are, in m."""
+        return np.asarray(self.image.origin + (self.first + self.spacing * places) @ self.image.axes.T)
+
+
+def _weights(points: np.ndarray, voxels: np.ndarray, deviation: float, voxel: float) -> np.ndarray:
+    """Return the weight of each voxel at each point of a lattice, (points, voxels).
+
+    Twice a Gaussian less a wider one: its second moment is zero, so that smoothing does not shrink what is round.
+    """
+    from scipy.special import ndtr
+
+    away = points[:, None] - voxels
+    parts = [
+        ndtr((away + voxel / 2) / s) - ndtr((away - voxel / 2) / s)
+        for s in (deviation, np.sqrt(2.0) * deviation)
+    ]
+    return np.asarray(2 * parts[0] - parts[1], dtype=np.float32)
+
+
+def _thicken(cells: np.ndarray) -> np.ndarray:
+    """Return the labels without edges at which the body touches itself: a point between is given to it."""
+    cells = cells.copy()
+    for _ in range(20):
+        changed = False
+        for a, b in ((0, 1), (0, 2), (1, 2)):
+            one = np.moveaxis(cells, (a, b), (0, 1))  # a view: changes reach the labels
+            p, q, r, s = one[:-1, :-1], one[1:, :-1], one[:-1, 1:], one[1:, 1:]
+            first = (p > 0) & (s > 0) & (q == 0) & (r == 0)
+            second = (p == 0) & (s == 0) & (q > 0) & (r > 0)
+            if first.any() or second.any():
+                changed = True
+                q[first] = p[first]
+                p[second] = q[second]
+        if not changed:
+            break
+    return cells
+
+
+def _quads(cells: np.ndarray, cube: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners (q, 4) of a quadrilateral between each pair of neighbours that differ, and their labels (q, 2).
+
+    It is counter-clockwise as seen from the second.
+    """
+    quads, sides = [], []
+    for d in range(3):
+        ahead = [slice(None)] * 3
+        behind = [slice(None)] * 3
+        ahead[d], behind[d] = slice(1, None), slice(None, -1)
+        one, other = cells[tuple(behind)], cells[tuple(ahead)]
+        place = np.argwhere(one != other)
+        at = tuple(place.T)
+        u, v = np.eye(3, dtype=int)[[(d + 1) % 3, (d + 2) % 3]]
+        ring = [cube[tuple((place - a * u - b * v).T)] for a, b in ((1, 1), (0, 1), (0, 0), (1, 0))]
+        quads.append(np.column_stack(ring))
+        sides.append(np.column_stack([one[at], other[at]]))
+    return np.concatenate(quads), np.concatenate(sides)
+
+
+def _settle(
+    lattice: _Lattice, centres: np.ndarray, corner: np.ndarray, quads: np.ndarray, sides: np.ndarray
+) -> np.ndarray:
+    """Return the places of vertices: evenly spread, and where the shares of their labels are equal."""
+    present = np.sort(corner, axis=1)
+    fresh = np.column_stack([np.ones(len(corner), bool), present[:, 1:] != present[:, :-1]])
+    count = fresh.sum(axis=1)
+    mean, is_joined = _neighbour_mean(quads, count)
+    places = centres.copy()
+    for k in range(EVEN + EXACT):
+        if 0 < k < EVEN:
+            places = np.where(is_joined[:, None], (places + mean @ places) / 2, places)
+        if k > 2:
+            lattice.keep_volumes(places, quads, sides)
+        for _ in range(2):
+            places = places + _newton(lattice, places, present, fresh, count)
+            places = np.clip(places, centres - WITHIN, centres + WITHIN)
+    return places
+
+
+def _neighbour_mean(quads: np.ndarray, count: np.ndarray) -> tuple[Any, np.ndarray]:
+    """Return the matrix of the mean over each vertex's neighbours, and which vertices have any.
+
+    Where three tissues meet (`count`), vertices are spread along that line alone.
+    """
+    from scipy.sparse import coo_matrix, diags_array
+
+    edges = np.unique(
+        np.sort(np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1), axis=0
+    )
+    pairs = np.concatenate([edges, edges[:, ::-1]])
+    pairs = pairs[count[pairs[:, 1]] >= count[pairs[:, 0]]]
+    joined = coo_matrix((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(count),) * 2).tocsr()
+    degree = np.asarray(joined.sum(axis=1)).ravel()
+    return diags_array(1 / np.maximum(degree, 1)) @ joined, degree > 0
+
+
+def _newton(
+    lattice: _Lattice, places: np.ndarray, present: np.ndarray, fresh: np.ndarray, count: np.ndarray
+) -> np.ndarray:
+    """Return the step (n, 3) to where the shares of each place's labels are equal, to first order."""
+    step = np.zeros_like(places)
+    for number in range(2, min(int(count.max()), 4) + 1):
+        rows = np.flatnonzero(count == number if number < 4 else count >= 4)
+        if not len(rows):
+            continue
+        labels = present[rows][fresh[rows]].reshape(len(rows), -1) if number < 4 else np.array(
+            [row[new][:4] for row, new in zip(present[rows], fresh[rows], strict=True)])
+        here = places[rows]
+        share = np.column_stack([lattice.at(label, here) + lattice.bias[label] for label in labels.T])
+        slope = np.stack([
+            np.column_stack([
+                (lattice.at(label, here + STEP * e) - lattice.at(label, here - STEP * e)) / (2 * STEP)
+                for e in np.eye(3)
+            ]) for label in labels.T
+        ], axis=1)
+        misfit, jacobian = share[:, 1:] - share[:, :1], slope[:, 1:] - slope[:, :1]
+        inverse = np.linalg.pinv(jacobian, rcond=0.1)
+        move = -np.einsum("nij,nj->ni", inverse, misfit)
+        weak = np.linalg.norm(jacobian, axis=(1, 2)) < FLAT
+        move[weak] = 0.0
+        step[rows] = move
+    return np.clip(step, -0.5, 0.5)
+
+
+def _halve(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
+    """Return each quadrilateral as two triangles along its shorter diagonal, (2q, 3)."""
+    a, b, c, d = quads.T
+    short = np.linalg.norm(points[a] - points[c], axis=1) <= np.linalg.norm(points[b] - points[d], axis=1)
+    first = np.where(short[:, None], np.column_stack([a, b, c]), np.column_stack([a, b, d]))
+    second = np.where(short[:, None], np.column_stack([a, c, d]), np.column_stack([b, c, d]))
+    return np.stack([first, second], axis=1).reshape(-1, 3)

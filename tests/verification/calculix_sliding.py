@@ -47,7 +47,7 @@ def deck(
     for slip, depth in motion:
         lines += [
             *("*STEP, NLGEOM, INC=400", "*STATIC", "0.5, 1., 1e-4, 1.", "*BOUNDARY"),
-            *(f"TOOLNODES, 1, 1, {slip / MILLI!r}", f"TOOLNODES, 3, 3, {-depth / MILLI!r}"),
+            *(f"TOOLNODES, 1, 1, {float(slip) / MILLI!r}", f"TOOLNODES, 3, 3, {-float(depth) / MILLI!r}"),
             *("*NODE PRINT, NSET=TOOLNODES, TOTALS=ONLY, FREQUENCY=1000", "RF", "*END STEP"),
         ]
     return "\n".join(lines) + "\n"

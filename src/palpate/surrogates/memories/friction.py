@@ -155,8 +155,9 @@ def _refresh(fresh, dt, slipped, law, depth) -> float:  # type: ignore[no-untype
 def _rub(position, q, slope, dt, stored, lost, force, ledger, hold, springs, law, depths, way) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Move the tool, add the springs' force to `force` (3,), N, which is that without friction, and book the step.
 
-    `stored` and `lost`, J, are what the body itself stores then and has lost in the step; negative where it forgets, and
-    the force is made here. `hold` (6,) has whether there was contact, the last place, k and φ; `law` has μ_s, μ_k, ρ, m and t_h; `way` (3,) is scratch.
+    `stored` and `lost`, J, are what the body itself stores then and has lost in the step; negative where it forgets,
+    and the force is made here. `hold` (6,) has whether there was contact, the last place, k and φ; `law` has μ_s, μ_k,
+    ρ, m and t_h; `way` (3,) is scratch.
     """
     if stored < 0.0:
         stored = 0.5 * q * q

@@ -58,7 +58,10 @@ def rough_study(study: Study) -> Study | None:
     body, acting = study.body, study.interaction
     if not (isinstance(body, PartRecord) and isinstance(study.sweep, ProbeSweepRecord)):
         return None
-    if part_kind(body.file) in {"mesh", "scan"}:  # other triangles of a scan would not be those that were picked
+    if part_kind(body.file) in {
+        "mesh",
+        "scan",
+    }:  # other triangles of a scan would not be those that were picked
         return None
     sweep = study.sweep.model_copy(update={"element": getattr(acting, "radius", None)})
     return study.model_copy(update={"name": f"{study.name}-rough", "sweep": sweep})

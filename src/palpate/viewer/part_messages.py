@@ -225,7 +225,8 @@ class Answer(Json):
     """The answer to a wish, server to page: problems in sentences, or none where all fits."""
 
     problem: str  # of the whole; empty where there is none
-    # problems of single choices, by the names of `StartWish`; of sizes by ``size-`` and theirs, of regions by ``region-`` and their numbers; null: none of them was judged
+    # problems of single choices, by the names of `StartWish`; of sizes by ``size-`` and theirs, of regions by
+    # ``region-`` and their numbers; null: none of them was judged
     fields: Mapping[str, str] | None = None
     trial: bool = False  # whether the wish was one on trial
     tool: DrawnTool | None = None  # the tool that was wished for, to be drawn

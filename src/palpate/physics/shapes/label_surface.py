@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-
 from typing import Any
 
 import numpy as np
@@ -55,7 +54,9 @@ def label_surface(image: LabelImage, spacing: float) -> LabelSurface:
     lattice = _Lattice(image, spacing)
     cells = lattice.cells()
     cube = np.full(np.array(cells.shape) - 1, -1)
-    corner = np.stack([cells[tuple(slice(c, c + n) for c, n in zip(k, cube.shape, strict=True))] for k in CORNERS], -1)
+    corner = np.stack(
+        [cells[tuple(slice(c, c + n) for c, n in zip(k, cube.shape, strict=True))] for k in CORNERS], -1
+    )
     mixed = np.argwhere((corner != corner[..., :1]).any(axis=-1))
     cube[tuple(mixed.T)] = np.arange(len(mixed))
     corner = corner[tuple(mixed.T)]
@@ -84,8 +85,12 @@ class _Lattice:
         self.first = middle - (counts - 1) / 2 * spacing
         part = image.labels[tuple(slice(a, b) for a, b in zip(low, high, strict=True))]
         weights = [
-            _weights(self.first[d] + spacing * np.arange(counts[d]), (low[d] + np.arange(part.shape[d])) * image.spacing[d],
-                     math.hypot(SMOOTH_VOXEL * image.spacing[d], SMOOTH_LATTICE * spacing), image.spacing[d])
+            _weights(
+                self.first[d] + spacing * np.arange(counts[d]),
+                (low[d] + np.arange(part.shape[d])) * image.spacing[d],
+                math.hypot(SMOOTH_VOXEL * image.spacing[d], SMOOTH_LATTICE * spacing),
+                image.spacing[d],
+            )
             for d in range(3)
         ]
         shares = [
@@ -103,8 +108,7 @@ class _Lattice:
         self.splines = [spline_filter(share, order=3) for share in self.shares]
 
     def cells(self) -> np.ndarray:
-        """Return the label with the largest share at each point, (a, b, c) int; edges that are shared by four surfaces
-        are removed."""
+        """Return the label with the largest share at each point, (a, b, c) int."""
         return _thicken(np.asarray(self.shares.argmax(axis=0)))
 
     def at(self, label: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -115,7 +119,9 @@ class _Lattice:
         for number, spline in enumerate(self.splines):
             mine = label == number
             if mine.any():
-                value[mine] = map_coordinates(spline, places[mine].T, order=3, prefilter=False, mode="nearest")
+                value[mine] = map_coordinates(
+                    spline, places[mine].T, order=3, prefilter=False, mode="nearest"
+                )
         return value
 
     def keep_volumes(self, places: np.ndarray, quads: np.ndarray, sides: np.ndarray) -> None:
@@ -173,7 +179,7 @@ def _thicken(cells: np.ndarray) -> np.ndarray:
 
 
 def _quads(cells: np.ndarray, cube: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners (q, 4) of a quadrilateral between each pair of neighbours that differ, and their labels (q, 2).
+    """Return corners (q, 4) of a quadrilateral between each two neighbours that differ, and their labels (q, 2).
 
     It is counter-clockwise as seen from the second.
     """
@@ -219,9 +225,7 @@ def _neighbour_mean(quads: np.ndarray, count: np.ndarray) -> tuple[Any, np.ndarr
     """
     from scipy.sparse import coo_matrix, diags_array
 
-    edges = np.unique(
-        np.sort(np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1), axis=0
-    )
+    edges = np.unique(np.sort(np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1), axis=0)
     pairs = np.concatenate([edges, edges[:, ::-1]])
     pairs = pairs[count[pairs[:, 1]] >= count[pairs[:, 0]]]
     joined = coo_matrix((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(count),) * 2).tocsr()
@@ -238,16 +242,25 @@ def _newton(
         rows = np.flatnonzero(count == number if number < 4 else count >= 4)
         if not len(rows):
             continue
-        labels = present[rows][fresh[rows]].reshape(len(rows), -1) if number < 4 else np.array(
-            [row[new][:4] for row, new in zip(present[rows], fresh[rows], strict=True)])
+        labels = (
+            present[rows][fresh[rows]].reshape(len(rows), -1)
+            if number < 4
+            else np.array([row[new][:4] for row, new in zip(present[rows], fresh[rows], strict=True)])
+        )
         here = places[rows]
         share = np.column_stack([lattice.at(label, here) + lattice.bias[label] for label in labels.T])
-        slope = np.stack([
-            np.column_stack([
-                (lattice.at(label, here + STEP * e) - lattice.at(label, here - STEP * e)) / (2 * STEP)
-                for e in np.eye(3)
-            ]) for label in labels.T
-        ], axis=1)
+        slope = np.stack(
+            [
+                np.column_stack(
+                    [
+                        (lattice.at(label, here + STEP * e) - lattice.at(label, here - STEP * e)) / (2 * STEP)
+                        for e in np.eye(3)
+                    ]
+                )
+                for label in labels.T
+            ],
+            axis=1,
+        )
         misfit, jacobian = share[:, 1:] - share[:, :1], slope[:, 1:] - slope[:, :1]
         inverse = np.linalg.pinv(jacobian, rcond=0.1)
         move = -np.einsum("nij,nj->ni", inverse, misfit)

@@ -16,7 +16,13 @@ from palpate.errors import UsageError
 from palpate.file_kinds import SCAN_ENDINGS, part_kind
 from palpate.format import millimetres
 from palpate.physics.apart import mesh_apart, read_apart
-from palpate.physics.shapes.body_file import SurfacePatch, apply_patches, digest_of, require_same, tell_repairs
+from palpate.physics.shapes.body_file import (
+    SurfacePatch,
+    apply_patches,
+    digest_of,
+    require_same,
+    tell_repairs,
+)
 from palpate.physics.shapes.label_surface import LabelSurface, label_surface
 from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volumes, to_ngsolve
 from palpate.physics.shapes.mesh_file import refine_mesh
@@ -25,7 +31,7 @@ from palpate.physics.shapes.naming import require_name
 from palpate.physics.shapes.scan_file import LabelImage, clear_specks, name_labels, read_scan
 from palpate.physics.shapes.shape import Shape, require_size
 
-__all__ = ["CUT_FACE", "UPWARDS", "ImportedScan"]
+__all__ = ["CUT_FACE", "UPWARDS", "ImportedScan", "turn_upwards"]
 
 UPWARDS = {
     "superior": (0.0, 0.0, 1.0),
@@ -46,6 +52,7 @@ LENGTH = 100.0  # longest side in the units in which Netgen meshes: its toleranc
 TELLS = 0.03  # difference of a tissue's volume from that of its voxels, which is told
 LOST = 0.5  # share of a tissue's volume below which the mesh is refused
 CUT = 0.75  # of an element: nearer to the end of the image, a surface is that of a cut
+STRAIGHT = 0.7  # cosine of the angle to the image's axis within which a triangle faces the end
 
 
 @dataclass(frozen=True)
@@ -185,7 +192,7 @@ def _mesh_scan(
     image = clear_specks(name_labels(path, read_scan(path), labels))
     size = image.labels.shape * image.spacing
     require_size(path, float(size.max()), "mm")
-    turned = _turned(image, up)
+    turned = turn_upwards(image, up)
     volume = sum(image.volumes.values())
     spacing = element or float(f"{(volume / CUBES) ** (1 / 3):.2g}")
     require_budget([(volume, spacing)], [])
@@ -196,7 +203,7 @@ def _mesh_scan(
     return mesh, (*image.notes, *_told(path, image, mesh, spacing))
 
 
-def _turned(image: LabelImage, up: str) -> LabelImage:
+def turn_upwards(image: LabelImage, up: str) -> LabelImage:
     """Return the image in coordinates whose z is a direction of the patient."""
     if up == "superior":
         return image
@@ -248,12 +255,14 @@ def _body(
     order = np.argsort(region, kind="stable")
     tetrahedra, region = tetrahedra[order], region[order] - 1
     outer = outer_faces(tetrahedra)
-    key = {tuple(row): int(k) for row, k in zip(
-        np.sort(surface.triangles, axis=1).tolist(), surface.inside, strict=True)}
+    key = {
+        tuple(row): int(k)
+        for row, k in zip(np.sort(surface.triangles, axis=1).tolist(), surface.inside, strict=True)
+    }
     behind = np.array([key.get(tuple(row), 0) for row in np.sort(outer, axis=1).tolist()])
     names = list(image.names)
     present = [k for k in range(len(names)) if (region == k).any()]
-    index = np.where(_on_cut(image, points[outer].mean(axis=1), spacing), len(names), behind - 1)
+    index = np.where(_on_cut(image, points[outer], spacing), len(names), behind - 1)
     every = [*(f"{name} surface" for name in names), CUT_FACE]
     used, surface_of = np.unique(index, return_inverse=True)
     return BodyMesh(
@@ -267,11 +276,16 @@ def _body(
     )
 
 
-def _on_cut(image: LabelImage, places: np.ndarray, spacing: float) -> np.ndarray:
-    """Return which places (n, 3) in m lie at the end of the image."""
-    along = (places - image.origin) @ np.linalg.inv(image.axes).T / image.spacing + 0.5  # voxels from its corner
+def _on_cut(image: LabelImage, corners: np.ndarray, spacing: float) -> np.ndarray:
+    """Return which triangles (t, 3, 3) in m lie at an end of the image and face it."""
+    back = np.linalg.inv(image.axes).T
+    along = (corners.mean(axis=1) - image.origin) @ back / image.spacing + 0.5  # voxels from its corner
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = across @ back / np.linalg.norm(across, axis=1)[:, None]
     near = CUT * spacing / image.spacing
-    return np.asarray(((along < near) | (along > image.labels.shape - near)).any(axis=1))
+    first = (along < near) & (facing < -STRAIGHT)
+    last = (along > image.labels.shape - near) & (facing > STRAIGHT)
+    return np.asarray((first | last).any(axis=1))
 
 
 def _told(path: str, image: LabelImage, mesh: BodyMesh, spacing: float) -> list[str]:
@@ -289,5 +303,7 @@ def _told(path: str, image: LabelImage, mesh: BodyMesh, spacing: float) -> list[
                 fix=f"Choose smaller ones, such as {millimetres(spacing / 2)}, or leave the label out.",
             )
         if abs(there - wanted) > TELLS * wanted:
-            told.append(f"{said}: elements of {millimetres(spacing)} hold it in part; smaller ones hold more.")
+            told.append(
+                f"{said}: elements of {millimetres(spacing)} hold it in part; smaller ones hold more."
+            )
     return told

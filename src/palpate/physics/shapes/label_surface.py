@@ -25,7 +25,10 @@ SMOOTH_VOXEL, SMOOTH_LATTICE = 0.85, 0.35
 EVEN, EXACT = 8, 4  # rounds that spread the vertices and step back to the surface, and of these steps alone
 WITHIN = 0.45  # of the lattice's spacing: a vertex stays in its cube, so that surfaces don't cut each other
 FAIR = 2.5  # voxels: waves of about four times this length are halved where terraces are removed
-SHIFTS, MOST_SHIFT = 6, 0.1  # rounds in which volumes are kept, and how far surfaces move in each, in lattice spacings
+SHIFTS, MOST_SHIFT = (
+    6,
+    0.1,
+)  # rounds in which volumes are kept, and how far surfaces move in each, in lattice spacings
 FAIR_ROUNDS = 3  # of this, each within half a voxel
 TERRACE = 0.5  # of a voxel: how far a place moves by it
 STEP = 0.05  # of the lattice's spacing, in the difference quotient of an indicator
@@ -51,6 +54,12 @@ class LabelSurface:
     triangles: np.ndarray
     inside: np.ndarray
     outside: np.ndarray
+
+    @property
+    def area_vectors(self) -> np.ndarray:
+        """Normal towards `outside` times area of each triangle in m², shape (t, 3)."""
+        a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
+        return np.cross(b - a, c - a) / 2
 
 
 def label_surface(image: LabelImage, spacing: float) -> LabelSurface:

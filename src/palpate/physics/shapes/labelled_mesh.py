@@ -49,7 +49,7 @@ CUT_FACE = "cut"
 CUBES = 2000  # of an element's edge that fill the body, where no size is given: seconds a solve
 COARSER = 1.5  # largest element inside over that of the surfaces
 LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
-TELLS = 0.03  # difference of a tissue's volume from that of its voxels, which is told
+TELLS = 0.05  # difference of a tissue's volume from that of its voxels, which is told
 LOST = 0.5  # share of a tissue's volume below which the mesh is refused
 CUT = 0.75  # of an element: nearer to the end of the image, a surface is that of a cut
 STRAIGHT = 0.7  # cosine of the angle to the image's axis within which a triangle faces the end
@@ -200,7 +200,7 @@ def _mesh_scan(
     points, tetrahedra, region = _fill(path, surface, spacing)
     # the numbers of regions that the mesh has are those of the labels, from 1
     mesh = _body(turned, surface, points, tetrahedra, region, spacing)
-    return mesh, (*image.notes, *_told(path, image, mesh, spacing))
+    return mesh, (*image.notes, *_told(path, image, surface, mesh, spacing))
 
 
 def turn_upwards(image: LabelImage, up: str) -> LabelImage:
@@ -288,12 +288,13 @@ def _on_cut(image: LabelImage, corners: np.ndarray, spacing: float) -> np.ndarra
     return np.asarray((first | last).any(axis=1))
 
 
-def _told(path: str, image: LabelImage, mesh: BodyMesh, spacing: float) -> list[str]:
+def _told(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, spacing: float) -> list[str]:
     """Return sentences about what became of each tissue; refuse a mesh that has lost one."""
     told = []
     if CUT_FACE in mesh.surfaces:
         told.append(f"The body reaches the end of the image; its surface there is called {CUT_FACE!r}.")
-    for name, wanted in image.volumes.items():
+    sizes = np.linalg.norm(surface.area_vectors, axis=1)
+    for number, (name, wanted) in enumerate(image.volumes.items(), 1):
         there = mesh.region_volumes.get(name, 0.0)
         said = f"{1e6 * there:.3g} ml of {name} in the mesh, {1e6 * wanted:.3g} ml in the voxels"
         if there < LOST * wanted:
@@ -302,8 +303,13 @@ def _told(path: str, image: LabelImage, mesh: BodyMesh, spacing: float) -> list[
                 why=f"It is too thin: {said}.",
                 fix=f"Choose smaller ones, such as {millimetres(spacing / 2)}, or leave the label out.",
             )
-        if abs(there - wanted) > TELLS * wanted:
+        around = sizes[(surface.inside == number) | (surface.outside == number)].sum()
+        thick = (
+            2 * wanted / around
+        )  # of a layer; of other shapes about as much as of a layer as thick as they
+        if thick < spacing or abs(there - wanted) > TELLS * wanted:
             told.append(
-                f"{said}: elements of {millimetres(spacing)} hold it in part; smaller ones hold more."
+                f"{name} is about {millimetres(thick)} thick, and elements {millimetres(spacing)}: {said}, but layers "
+                f"thinner than an element come out ragged. Elements of {millimetres(0.7 * thick)} keep them, and take longer."
             )
     return told

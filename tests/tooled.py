@@ -15,10 +15,11 @@ import numpy as np
 import pressed
 from models import linear_network
 from palpate.learning.learn_arm import ARM_OUTPUTS
-from palpate.surrogates import LearntEnergy, LearntQuantities, Surrogate
+from palpate.surrogates import Continuation, LearntEnergy, LearntQuantities, Surrogate
 from palpate.surrogates.baselines import ToolBaseline
-from palpate.surrogates.learnt_torque import ARM
+from palpate.surrogates.learnt_torque import ARM, TURNS
 from palpate.tools import Capsule, PosedTool
+from palpate.units import Quantity, Range
 
 TOOL = PosedTool(Capsule(0.004, 0.02), (0.1, 0.2, 0.0))
 # m at the middle of the ranges, and m from there to their ends
@@ -42,3 +43,19 @@ def torque(X: np.ndarray) -> np.ndarray:
     low, high = np.array([[r.low for r in pressed.INPUTS], [r.high for r in pressed.INPUTS]])
     scaled = 2.0 * (X - low) / (high - low) - 1.0
     return np.asarray(np.linalg.norm(pressed.force(X), axis=1)[:, None] * (MIDDLE + scaled @ SLOPES.T))
+
+
+# slopes of ln U by the components of a turn, 1/rad
+BY_TURN = np.array([0.7, -1.1, 0.4])
+TILT = 0.3  # rad
+
+
+def turned_surrogate(turns: int = 3) -> Surrogate:
+    """The closed form times exp(g · w), w being a turn of so many components: U = A s³ exp(b x + g · w)."""
+    body = surrogate()
+    energy = body.hand_energy
+    inputs = [*pressed.INPUTS, *(Range(name, -TILT, TILT, "rad") for name in TURNS[:turns])]
+    slopes = [pressed.B * 0.02, 0.0, 0.0, *(TILT * BY_TURN[:turns])]
+    network = linear_network(inputs, [Quantity("ln U/U0")], np.array([[np.log(pressed.A), *slopes]]))
+    going = Continuation.of(tuple(inputs), deepest=pressed.DEEPEST)
+    return replace(body, energy=LearntEnergy(network, energy.baseline, continuation=going), quantities={})

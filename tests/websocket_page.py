@@ -50,11 +50,11 @@ def client_of(viewer: Viewer) -> Iterator[Client]:
         yield Client(socket)
 
 
-def socket_of(viewer: Viewer, **options: Any) -> ClientConnection:
+def socket_of(viewer: Viewer, path: str = "touch", **options: Any) -> ClientConnection:
     """A websocket to the page's place, with the cookie of the page."""
     cookies = "; ".join(f"{name}={value}" for name, value in viewer.cookies.items())
     options = {"origin": viewer.address.rstrip("/"), "additional_headers": {"Cookie": cookies}} | options
-    return connect(f"{viewer.address.replace('http', 'ws', 1)}touch", **options)
+    return connect(f"{viewer.address.replace('http', 'ws', 1)}{path}", **options)
 
 
 def get(viewer: Viewer | BodyViewer, path: str = "", **headers: str) -> httpx.Response:

@@ -26,6 +26,7 @@ from .physics import Circle as Circle
 from .physics import Fixed as Fixed
 from .physics import GluedPad as GluedPad
 from .physics import LoadAndUnload as LoadAndUnload
+from .physics import LumpProblem as LumpProblem
 from .physics import PointForce as PointForce
 from .physics import PointLoad as PointLoad
 from .physics import PrescribedDisplacement as PrescribedDisplacement
@@ -40,6 +41,7 @@ from .physics import TipLoad as TipLoad
 from .physics import Varied as Varied
 from .physics import materials as materials
 from .physics import named_material as named_material
+from .physics import read_tool as read_tool
 from .physics import roller as roller
 from .physics import shapes as shapes
 from .study import Study as Study

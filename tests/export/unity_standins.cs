@@ -96,7 +96,10 @@ namespace UnityEngine
     public sealed class Rigidbody : Component
     {
         public Vector3 pushed;
+        public Vector3 turned, at;
         public void AddForce(Vector3 force) { pushed = force; }
+        public void AddForceAtPosition(Vector3 force, Vector3 place) { pushed = force; at = place; }
+        public void AddTorque(Vector3 torque) { turned = torque; }
     }
     public class MonoBehaviour : Component { }
 

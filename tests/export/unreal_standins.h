@@ -75,7 +75,10 @@ struct UPrimitiveComponent : USceneComponent
 {
     FVector Pushed;
     bool IsSimulatingPhysics() const { return true; }
+    FVector Turned, At;
     void AddForce(const FVector& force) { Pushed = force; }
+    void AddForceAtLocation(const FVector& force, const FVector& place) { Pushed = force, At = place; }
+    void AddTorqueInRadians(const FVector& torque) { Turned = torque; }
 };
 template <class T> T* Cast(UObject* thing) { return dynamic_cast<T*>(thing); }
 struct AActor : UObject

@@ -13,7 +13,7 @@ from palpate.export import export_c
 from palpate.export.onnx_export import export_onnx
 from palpate.learning.pressed_solves import PressedSolves
 from palpate.runtime.touchable import touchable
-from palpate.surrogates.baselines import deepest_ball
+from palpate.surrogates.baselines import PosedBaseline, deepest_ball
 from palpate.tools import Capsule, PosedTool, Punch, Sphere
 from palpate.validation import TouchSolves
 from palpate.viewer.page_model import PageModel
@@ -98,7 +98,7 @@ def test_the_deepest_point_of_a_tilted_tool():
         assert radius >= tool.shape.size
 
 
-def test_a_tool_on_a_curved_surface_is_refused():
+def test_a_tool_on_a_curved_surface_is_known_by_its_balls():
     """The three sides of the tetrahedron face different ways: the deepest point depends on the place."""
-    with pytest.raises(UsageError, match="curved surface 'side' can't be learnt"):
-        PressedSolves.of(under(PosedTool(Capsule(0.006, 0.03)), touches="side"))
+    pressed_solves = PressedSolves.of(under(PosedTool(Capsule(0.04, 0.2)), touches="side"))
+    assert isinstance(pressed_solves.baseline, PosedBaseline)

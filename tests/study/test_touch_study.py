@@ -27,8 +27,10 @@ def test_a_quick_study_solves_less_and_asks_less():
     for name in SOLIDS:
         whole, quick = preset_study(name), preset_study(name, quick=True)
         assert quick.sweep.samples < whole.sweep.samples
-        assert quick.sweep.element > whole.interaction.radius / 2
-        if whole.interaction.kind == "probe":
+        acting = whole.interaction
+        size = acting.shape.build().size if acting.kind == "tool" else acting.radius
+        assert quick.sweep.element > size / 2
+        if acting.kind != "pad":
             assert quick.interaction.depth[1] < whole.interaction.depth[1]
         for key, value in quick.target:
             if key not in {"smoothness", "coverage", "loop_work"}:
@@ -237,7 +239,7 @@ def test_files_of_the_first_version_are_read(text, tmp_path):
         ('[interaction]\nkind = "probe"', "a cantilever takes the interaction loads, not probe"),
         (
             '[interaction]\nkind = "prob"',
-            "no kind of interaction 'prob'; there are loads, probe, pad; did you mean",
+            "no kind of interaction 'prob'; there are loads, probe, tool, pad; did you mean",
         ),
         ('[body]\nmaterial = "annealed copper"', "remembers its history: give a table [memory]"),
         ("[memory]\nhistories = 3", "which 'nylon' does not"),

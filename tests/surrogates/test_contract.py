@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from surrogate_checks import CHECKS, MEMORY_CHECKS, Example
 from test_pad_energy import made as pad_energy
-from touch_made import BOX, RADIUS, around_points, overlap_baseline, plane, touch_energy, undisturbed
+from touch_made import BOX, DEEPEST, RADIUS, around_points, overlap_baseline, plane, touch_energy, undisturbed
 
 import palpate as pp
 from models import linear_network
@@ -21,12 +21,13 @@ from palpate.surrogates import (
     Compiled,
     ConstantBaseline,
     ContactLaw,
+    Continuation,
     LearntEnergy,
     PadBaseline,
     RestStiffness,
     Stiffening,
 )
-from palpate.surrogates.baselines import ToolBaseline, deepest_ball, registered_baselines
+from palpate.surrogates.baselines import PosedBaseline, ToolBaseline, deepest_ball, registered_baselines
 from palpate.surrogates.energy_kernels import entry_of
 from palpate.surrogates.memories import Friction, Indentation, IwanElements, Memory, Patches, Relaxation
 from palpate.tools import Capsule, PosedTool
@@ -70,6 +71,29 @@ def tool() -> Example:
 
 
 @functools.cache
+def posed() -> Example:
+    """A capsule on a plane whose axis is an input."""
+    tool = PosedTool(Capsule(0.006, 0.03), (0.0, 0.0, 0.4), turns="axis", tilt=0.3)
+    way = np.array([0.0, 0.0, RADIUS - 0.008])  # not so deep that the plane's distance turns back
+    moved = [pp.Range(f"tip{r.name[1:]}", r.low - w, r.high - w, "m") for r, w in zip(BOX, way, strict=True)]
+    baseline = PosedBaseline(ContactLaw("series", 1e-3), plane(), 0.006, tool=json.dumps(tool.describe()))
+    going = Continuation.of(
+        [*moved, *tool.angles], deepest=DEEPEST - 0.003
+    )  # its end is deeper than its place
+    energy = touch_energy(box=moved, extra=tool.angles, baseline=baseline, continuation=going)
+    below = np.append(way, np.zeros(2))
+    rest = around_points(100, extra=tool.angles) - below
+    rest[:, 2] += 0.03
+    smooth = undisturbed(energy, around_points(1500, extra=tool.angles) - below, 1e-4)
+    places, turns = tool.pose(smooth)
+    # nor where one of its balls begins to touch
+    heights = places[:, None, 2] + np.einsum("ni,bi->nb", turns[:, 2], baseline.balls[:, :3])
+    clear = (np.abs(heights - baseline.balls[:, 3]) > 1e-4).all(axis=1)
+    smooth = smooth[clear & (np.abs(places[:, :2]) < 0.025).all(axis=1)]
+    return Example(pp.Surrogate(energy), rest, smooth)
+
+
+@functools.cache
 def pad() -> Example:
     """A glued pad on a face, displaced in all directions."""
     rest = np.zeros((20, 5))
@@ -109,7 +133,7 @@ def _region(n: int) -> TrainedRegion:
     return TrainedRegion.of(np.random.default_rng(1).uniform(-1.0, 1.0, (200, n)))
 
 
-BODIES = (contact, overlap, tool, pad, node, constant)
+BODIES = (contact, overlap, tool, posed, pad, node, constant)
 
 
 def relaxation(q: float) -> Memory:

@@ -12,16 +12,14 @@ import pressed
 import tooled
 from palpate.errors import UsageError
 from palpate.export import export_c
+from palpate.export.c_export import block_of
+from palpate.export.check_engine import CheckEngine, engine_library
+from palpate.export.fmu_export import export_fmu
 from palpate.export.lib_export import export_lib
+from palpate.export.wasm_core import WasmCore
 from palpate.runtime.touchable import touchable
-from palpate.surrogates.learnt_torque import TurnEvaluator, left_jacobian, torque_of_slopes
-from palpate.tools import PosedTool, Sphere
-
-
-def rotation(w):
-    """exp of a rotation vector (3,)."""
-    turn = PosedTool(Sphere(0.01), tuple(w)).turn
-    return np.eye(3) if turn is None else turn
+from palpate.surrogates.learnt_torque import TurnEvaluator, torque_of_slopes
+from palpate.tools.rotations import rotation_matrix
 
 
 @pytest.fixture(scope="module")
@@ -57,32 +55,23 @@ def test_a_body_under_a_ball_tells_none():
         pressed.surrogate().torque(pressed.places(1))
 
 
-def test_the_left_jacobian_takes_changes_of_the_vector_to_turns():
-    rng = np.random.default_rng(0)
-    for size in (0.0, 1e-5, 0.3, 2.0):
-        w, dw = rng.normal(size=3), 1e-6 * rng.normal(size=3)
-        w *= size / np.linalg.norm(w)
-        turned = rotation(left_jacobian(w) @ dw) @ rotation(w)
-        np.testing.assert_allclose(rotation(w + dw), turned, atol=1e-11)
-
-
 @pytest.mark.parametrize("names", [("tip_rx", "tip_ry"), ("tip_rx", "tip_ry", "tip_rz")])
 def test_the_torque_of_turns_is_the_work_of_every_small_turn(names):
     """U(R) = c · R e: a tool of revolution about its axis e; dU of a small turn φ is −τ · φ."""
     rng = np.random.default_rng(1)
-    first, c = rotation(rng.normal(size=3)), rng.normal(size=3)
+    first, c = rotation_matrix(rng.normal(size=3)), rng.normal(size=3)
     axis = first[:, 2]
 
     def energy(_, w):
-        return float(c @ rotation([*w, *[0.0] * (3 - len(w))]) @ axis)
+        return float(c @ rotation_matrix(np.array([*w, *[0.0] * (3 - len(w))])) @ axis)
 
     turns = TurnEvaluator(energy, range(len(names)), names, first)
     w = 0.4 * rng.normal(size=len(names))
     turns(np.zeros(3), w, np.ones(3))
-    R = rotation([*w, *[0.0] * (3 - len(names))])
+    R = rotation_matrix(np.array([*w, *[0.0] * (3 - len(names))]))
     np.testing.assert_allclose(turns.torque, -np.cross(R @ axis, c), atol=1e-7)
     for phi in 1e-5 * np.eye(3):
-        change = float(c @ (rotation(phi) - rotation(-phi)) @ R @ axis) / 2.0
+        change = float(c @ (rotation_matrix(phi) - rotation_matrix(-phi)) @ R @ axis) / 2.0
         assert change == pytest.approx(-turns.torque @ phi, abs=1e-12)
     assert abs(turns.torque @ R @ axis) < 1e-7  # none about its own axis
 
@@ -124,3 +113,41 @@ def test_a_learnt_arm_of_a_sphere_leads_to_its_centre():
     assert math.isclose(
         float(np.abs(arm.predict(unseen)[:, 2]).max()), 0.0, abs_tol=1e-12
     )  # none about its axis
+
+
+def test_the_core_of_pages_and_engines_tells_the_torque(body):
+    block, X = block_of(body, field=None, with_field=False, deviation=False), pressed.places(50)
+    np.testing.assert_allclose(WasmCore.of(block).torques(X), body.torque(X), rtol=1e-9, atol=1e-15)
+    library = engine_library()
+    if library is not None:
+        with CheckEngine(library, block.to_bytes()) as engine:
+            np.testing.assert_allclose(engine.torques(X), body.torque(X), rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_a_tool_leaves_as_an_fmu_with_its_torque(body, tmp_path, version):
+    done = export_fmu(body, tmp_path / "tool.fmu", fmi=version)
+    assert done.comparison is not None
+    assert done.comparison.passed
+    assert done.comparison.parts["torque"].relative < 1e-9
+
+
+def test_an_arm_is_learnt_from_mirror_images_too():
+    """Solves on one side of a mirror plane tell the other: an arm along the mirror's normal turns round there."""
+    from palpate.learning.learn_arm import learn_arm
+    from palpate.options import FitOptions
+
+    def arms(X):
+        return np.column_stack([-2e-3 + X[:, 2], 0.1 * X[:, 0], 0.05 * X[:, 0]])  # x-mirror: (a, −b, −c)
+
+    X, mirror = pressed.places(60), np.diag([-1.0, 1.0, 1.0])
+    X[:, 0] = np.abs(X[:, 0])
+    data = pressed.dataset(
+        pressed.solves(X), torque=np.linalg.norm(pressed.force(X), axis=1)[:, None] * arms(X)
+    )
+    learnt = learn_arm(
+        data, data.ranges, FitOptions(), matrices=np.array([np.eye(3), mirror]), about=np.zeros(3)
+    )
+    assert learnt is not None
+    unseen = pressed.places(40, seed=9)
+    np.testing.assert_allclose(learnt.predict(unseen), arms(unseen), atol=2e-5)

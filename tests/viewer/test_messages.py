@@ -15,6 +15,7 @@ from palpate.errors import UsageError
 from palpate.viewer import typescript
 from palpate.viewer.messages import (
     PROTOCOL,
+    DrawnTool,
     Feel,
     FieldInfo,
     Frame,
@@ -36,7 +37,9 @@ from palpate.viewer.part_messages import (
     MaterialInfo,
     PartFacts,
     PartNews,
+    SizeInfo,
     StartWish,
+    ToolInfo,
     UnitWish,
     WrapWish,
 )
@@ -62,6 +65,8 @@ HELLO = Hello(
     holds=True,
     radius=0.005,
     radius_parameter=-1,
+    tool=None,
+    twists=False,
     deepest=0.7,
     force_max=5.0,
     stiffness_max=24.0,
@@ -79,12 +84,15 @@ HELLO = Hello(
     device="",
     meta={"errors": {"rmse": 1e-5}, "seed": 3},
 )
-PRESSED = dataclasses.replace(HELLO, holds=False, line=None, fields=(FIELD,), radius_parameter=1)
-SHOWN = Shown(PROTOCOL, "block", (FIELD,), (StepInfo("sample 3", {"energy": "1 mJ"}),), 0.01)
+TOOL = DrawnTool("box", (0.0, 0.0, 1.0), (0.0, 0.0, 0.5), (0.0, 0.5, 1.0), (0.0, 0.0, -1.0), (0, 0, 0), (-1, -1, 0))
+PRESSED = dataclasses.replace(HELLO, holds=False, line=None, fields=(FIELD,), radius_parameter=1, tool=TOOL)
+SHOWN = Shown(PROTOCOL, "block", (FIELD,), (StepInfo("sample 3", {"energy": "1 mJ"}),), 0.01, TOOL)
 NEWS = Recording(active=True, file="rod.trace", seconds=3.5, size=4e5, lost=0, problem="")
 REASON = Reason(now="no force", stopped=True, dropped="a bad number", ago=0.25)
 FEEL = Feel(body=900.0, limit=333.0, felt=333.0, override=False, words="softened")
-WISH = StartWish("", "neo-hookean", "10 kPa", "0.45", "6 mm", "3 mm")
+WISH = StartWish(
+    "", "neo-hookean", "10 kPa", "0.45", "6 mm", "3 mm", tool="capsule", sizes={"radius": "6 mm"}
+)
 FACTS = PartFacts(
     file="kidney.stl",
     unit="mm",
@@ -94,6 +102,7 @@ FACTS = PartFacts(
     whole=False,
     materials=(MaterialInfo("fat", "soft", "tissue", "3.3 kPa", "0.45"),),
     laws=("neo-hookean",),
+    tools=(ToolInfo("capsule", "a bar", (SizeInfo("radius", "radius", "6 mm"),)),),
     choices=dataclasses.asdict(WISH),
     notes=("repaired",),
 )
@@ -106,7 +115,7 @@ PART = (
     WISH,
     UnitWish("m"),
     WrapWish("1 mm"),
-    Answer("no", {"depth": "too deep"}),
+    Answer("no", {"depth": "too deep"}, tool=TOOL),
     LEARNING,
 )
 WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"), NEWS, REASON, FEEL, *PART)

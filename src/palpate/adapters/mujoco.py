@@ -28,16 +28,16 @@ import numpy as np
 
 from palpate.adapters.extra import import_extra
 from palpate.adapters.mujoco_callbacks import call_for, forget_scene
+from palpate.adapters.mujoco_tool import SceneTool, number_of, tool_of
 from palpate.errors import UsageError
 from palpate.format import millimetres
 from palpate.surrogates import Surrogate
-from palpate.surrogates.baselines import require_ball
 from palpate.surrogates.energy_evaluator import EnergyEvaluator
 
 __all__ = ["SENSOR_VALUES", "SoftContact", "StiffStepWarning", "attach"]
 
-SENSOR_VALUES = ("force_x", "force_y", "force_z", "trust", "inside")
-"""Values of a user sensor that a contact fills: N in the scene's axes, the force's relative deviation, 1 or 0."""
+SENSOR_VALUES = ("force_x", "force_y", "force_z", "trust", "inside", "torque_x", "torque_y", "torque_z")
+"""Values of a user sensor that a contact fills: N, the force's relative deviation, 1 or 0, N m; in the scene's axes."""
 
 _RADIUS_SLACK = 1e-3  # share of the learnt radius by which a tool's may differ
 _MILLIMETRES = 1e3
@@ -55,6 +55,7 @@ class _Answer:
     """The last answer of one thread and one MjData."""
 
     force: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    torque: np.ndarray = field(default_factory=lambda: np.zeros(3))
     trust: float = 0.0
     inside: bool = True
     depth: float = -math.inf
@@ -69,6 +70,8 @@ class _Place:
         self.jacobian, self.solved = np.zeros((3, contact.model.nv)), np.zeros((3, contact.model.nv))
         self.other, self.turn = np.zeros((3, contact.model.nv)), np.zeros((3, contact.model.nv))
         self.answer = _Answer()
+        self.torque_at = contact.body.torque_evaluator
+        self.parameters = contact.parameters.copy()
 
 
 class SoftContact:
@@ -85,14 +88,14 @@ class SoftContact:
     """
 
     def __init__(
-        self, model: Any, body: Surrogate, *, geom: int, base: int, place: np.ndarray, turn: np.ndarray,
+        self, model: Any, body: Surrogate, *, tool: SceneTool, base: int, place: np.ndarray, turn: np.ndarray,
         parameters: np.ndarray, sensor: tuple[int, int] | None,
     ) -> None:  # fmt: skip
         self._mujoco = import_extra("mujoco", "mujoco")
         self._model, self.body, self.parameters = weakref.ref(model), body, parameters
-        self._geom, self._base, self._sensor = geom, base, sensor
+        self._tool, self._base, self._sensor = tool, base, sensor
         self._place, self._turn = place, turn
-        self._bound = int(model.geom_bodyid[geom])
+        self._bound = tool.bound
         # of a tool that is light in some pose, and of a base that gives way too
         self._lightness = _MARGIN * float(model.body_invweight0[[self._bound, base], 0].sum())
         self._threads = threading.local()
@@ -108,6 +111,11 @@ class SoftContact:
     def force(self) -> np.ndarray:
         """Force (3,) on the tool at the last step, N, in the scene's axes; its opposite acts on what bears the body."""
         return self._last.force
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Torque (3,) on the tool about its place, N m, as `force`: zero of a ball, which has none about its centre."""
+        return self._last.torque
 
     @property
     def trust(self) -> float:
@@ -145,7 +153,7 @@ class SoftContact:
     def place(self, data: Any) -> np.ndarray:
         """Return the tool's place (3,) in the learnt body's frame, m."""
         place, turn = self.pose(data)
-        return np.asarray((data.geom_xpos[self._geom] - place) @ turn)
+        return np.asarray((self._tool.place(data) - place) @ turn)
 
     def detach(self) -> None:
         """Take the body out of the scene."""
@@ -165,14 +173,17 @@ class SoftContact:
         return mine
 
     def add_force(self, model: Any, data: Any) -> None:
-        """Add the force on the tool and its reaction to ``data.qfrc_passive``."""
+        """Add force and torque on the tool and their reactions to ``data.qfrc_passive``."""
         mine = self._mine()
         evaluator, answer = mine.evaluator, mine.answer
         place, turn = self.pose(data)
-        centre = data.geom_xpos[self._geom]
-        evaluator((centre - place) @ turn, self.parameters)
-        answer.depth, answer.inside, answer.energy = evaluator.depth, bool(evaluator.inside), evaluator.energy
-        answer.force = force = turn @ evaluator.force
+        centre = self._tool.place(data)
+        own, trained = (centre - place) @ turn, self._tool.turn_into(mine.parameters, data, turn)
+        evaluator(own, mine.parameters)
+        answer.depth, answer.inside = evaluator.depth, bool(evaluator.inside) and trained
+        answer.energy, answer.force = evaluator.energy, turn @ evaluator.force
+        answer.torque = _ZERO
+        force = answer.force
         self._last = answer
         if not force.any():
             return
@@ -180,9 +191,13 @@ class SoftContact:
         step = float(model.opt.timestep)
         if stiffness * step * step * self._lightness > _STIFF:
             answer.force = force = self._late_force(model, data, mine, turn)
-        self._mujoco.mj_applyFT(model, data, force, _ZERO, centre, self._bound, data.qfrc_passive)
+        if mine.torque_at is not None:
+            mine.torque_at(own, mine.parameters, turn.T @ force)
+            answer.torque = turn @ mine.torque_at.torque
+        torque = answer.torque
+        self._mujoco.mj_applyFT(model, data, force, torque, centre, self._bound, data.qfrc_passive)
         if self._base:
-            self._mujoco.mj_applyFT(model, data, -force, _ZERO, centre, self._base, data.qfrc_passive)
+            self._mujoco.mj_applyFT(model, data, -force, -torque, centre, self._base, data.qfrc_passive)
 
     def _late_force(self, model: Any, data: Any, mine: _Place, turn: np.ndarray) -> np.ndarray:
         """Return F + Δt K v', the force at the end of the step, with v' the velocity that it will bring about.
@@ -192,7 +207,7 @@ class SoftContact:
         explicit step would: there v' = 0.
         """
         mujoco, evaluator, step = self._mujoco, mine.evaluator, float(model.opt.timestep)
-        centre, J = data.geom_xpos[self._geom], mine.jacobian
+        centre, J = self._tool.place(data), mine.jacobian
         mujoco.mj_jac(model, data, J, mine.turn, centre, self._bound)
         if self._base:
             mujoco.mj_jac(model, data, mine.other, mine.turn, centre, self._base)
@@ -232,9 +247,10 @@ class SoftContact:
             return
         mine, (start, size) = self._mine(), self._sensor
         answer = mine.answer
-        known = mine.evaluator.trust(self.place(data), self.parameters) if size > 3 else 0.0
+        known = mine.evaluator.trust(self.place(data), mine.parameters) if size > 3 else 0.0
         answer.trust = known
-        data.sensordata[start : start + size] = [*answer.force, known, float(answer.inside)][:size]
+        values = [*answer.force, known, float(answer.inside), *answer.torque]
+        data.sensordata[start : start + size] = values[:size]
 
 
 _ZERO = np.zeros(3)
@@ -272,7 +288,8 @@ def attach(
     data: Any,
     body: Surrogate | str | os.PathLike[str],
     *,
-    geom: str,
+    geom: str | None = None,
+    site: str | None = None,
     at: Sequence[float],
     on: str = "world",
     moves: bool = False,
@@ -291,6 +308,10 @@ def attach(
         The learnt body, or its file.
     geom : str
         Name of the tool: a sphere of the learnt radius; of a body that is held, what holds it.
+    site : str, optional
+        In place of `geom`, where the body was learnt under a tool of another shape: a site at the tool's foremost
+        point, whose axes are the tool's own, so that the tool points along the site's −z. A tool of fixed orientation
+        counts as outside the trained region where the site is turned from that by more than 2°.
     at : (3,) or (7,)
         Place, m, and quaternion (w, x, y, z) of the learnt body's frame, in the frame of `on`.
     on : str
@@ -321,7 +342,7 @@ def attach(
             why="MuJoCo may step a state twice, or go back to an earlier one; the memory could not follow.",
             fix="Attach it without: body.with_memory(None).",
         )
-    tool, base = _index(mujoco, model, "geom", geom), _index(mujoco, model, "body", on)
+    tool, base = tool_of(mujoco, model, learnt, geom, site), number_of(mujoco, model, "body", on)
     if _can_move(model, base) and not moves:
         raise UsageError(
             f"The body stands on {on!r}, which can move.",
@@ -340,11 +361,11 @@ def attach(
     contact = SoftContact(
         model,
         learnt,
-        geom=tool,
+        tool=tool,
         base=base,
         place=numbers[:3].copy(),
         turn=turn.reshape(3, 3).copy(),
-        parameters=_parameters(learnt, model, tool, geom, parameters),
+        parameters=_parameters(learnt, model, tool, parameters),
         sensor=None if sensor is None else _sensor_of(mujoco, model, sensor),
     )
     if id(model) not in _SCENES:
@@ -371,23 +392,9 @@ def _unit(quaternion: np.ndarray) -> np.ndarray:
     return quaternion / length if length else np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def _index(mujoco: Any, model: Any, kind: str, name: str) -> int:
-    """Return the number of what has a name in the scene."""
-    number = int(mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name))
-    if number < 0:
-        rows = range(getattr(model, {"geom": "ngeom", "body": "nbody", "sensor": "nsensor"}[kind]))
-        names = [getattr(model, kind)(k).name for k in rows]
-        raise UsageError(
-            f"The scene has no {kind} named {name!r}.",
-            why=f"Its names are {', '.join(repr(n) for n in names if n) or 'none: nothing has one'}.",
-            fix=f"Name the {kind} in the scene's XML, and give that name.",
-        )
-    return number
-
-
 def _sensor_of(mujoco: Any, model: Any, name: str) -> tuple[int, int]:
     """Return where the values of a user sensor begin, and how many there are."""
-    number = _index(mujoco, model, "sensor", name)
+    number = number_of(mujoco, model, "sensor", name)
     size = int(model.sensor_dim[number])
     if int(model.sensor_type[number]) != int(mujoco.mjtSensor.mjSENS_USER) or size > len(SENSOR_VALUES):
         raise UsageError(
@@ -398,16 +405,18 @@ def _sensor_of(mujoco: Any, model: Any, name: str) -> tuple[int, int]:
     return int(model.sensor_adr[number]), size
 
 
-def _parameters(body: Surrogate, model: Any, tool: int, name: str, parameters: Sequence[float]) -> np.ndarray:
-    """Return the further inputs (p,), the tool's radius among them, after the tool was held against what was learnt."""
+def _parameters(body: Surrogate, model: Any, tool: SceneTool, parameters: Sequence[float]) -> np.ndarray:
+    """Return the further inputs (p,), the tool's radius and turn among them; a tool that was not learnt is refused."""
     baseline, felt = body.hand_energy.baseline, len(body.hand_energy.baseline.directions)
     values = [float(v) for v in parameters]
     own = None if baseline.radius_input is None else baseline.radius_input - felt
-    radius = float(model.geom_size[tool, 0])
-    if not baseline.holds:
-        _check_ball(body, model, tool, name)
-        if own is not None and len(values) == len(body.parameters) - 1:
-            values.insert(own, radius)
+    if not tool.is_site and not baseline.holds:
+        _check_ball(body, model, tool.number, tool.name)
+    radius = math.nan if tool.is_site else float(model.geom_size[tool.number, 0])
+    for number, _ in tool.inputs if len(values) == len(body.parameters) - len(tool.inputs) else ():
+        values.insert(number, 0.0)  # the scene tells them
+    if not baseline.holds and own is not None and len(values) == len(body.parameters) - 1:
+        values.insert(own, radius)
     if len(values) != len(body.parameters) or not np.isfinite(values).all():
         names = ", ".join(r.name for r in body.parameters) or "none"
         raise UsageError(
@@ -421,7 +430,6 @@ def _parameters(body: Surrogate, model: Any, tool: int, name: str, parameters: S
 def _check_ball(body: Surrogate, model: Any, tool: int, name: str) -> None:
     """Refuse a tool that is no ball, or of another radius than was learnt."""
     baseline, radius = body.hand_energy.baseline, float(model.geom_size[tool, 0])
-    require_ball(baseline, "be put into a scene")
     if int(model.geom_type[tool]) != int(import_extra("mujoco", "mujoco").mjtGeom.mjGEOM_SPHERE):
         raise UsageError(
             f"The tool {name!r} is no sphere.",

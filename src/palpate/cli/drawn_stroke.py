@@ -102,7 +102,7 @@ def _trained_places(hand: Touchable) -> list[np.ndarray]:
     X = X[hand.depth(X) <= hand.deepest * (1.0 + _ROUNDING)]
     X = X[np.argsort(-hand.depth(X))[:_TRIED]]
     distance, slope, _ = hand.surface.at(X[:, :3])
-    return list(X[:, :3] - distance[:, None] * slope / np.linalg.norm(slope, axis=1)[:, None])
+    return list(X[:, :3] + hand.shift - distance[:, None] * slope / np.linalg.norm(slope, axis=1)[:, None])
 
 
 def _press(
@@ -111,15 +111,17 @@ def _press(
     """Return the centres (k, 3) of a probe at depths (k,) below a place of the surface, in m."""
     centre, normal = np.asarray(hand.home), np.asarray(hand.normal)
     if given is not None:
-        distance, slope, _ = surface.at(given[None])
+        own = given - hand.shift  # on the surface that takes places
+        distance, slope, _ = surface.at(own[None])
         if not abs(distance[0]) <= max(depths[-1], surface.spacing):
             raise UsageError(
                 f"No contact at {_place(given)}: it does not lie on the touched surface.",
-                why="--at is the place of contact on the surface, and not the ball's centre as in `palpate ask --at`.",
+                why="--at is the place of contact on the surface, and not where the ball's centre or the tool is, as in `palpate "
+                "ask --at`.",
                 fix=_nearest(hand, surface, given),
             )
         normal = slope[0] / np.linalg.norm(slope[0])
-        centre = given + (hand.radius - distance[0]) * normal
+        centre = own + (hand.radius - distance[0]) * normal
     places = centre - depths[:, None] * normal
     reached = surface.depth(places, hand.radius)
     if (
@@ -128,7 +130,7 @@ def _press(
         or depths[-1] > surface.inner + hand.radius
     ):
         raise UsageError(
-            f"A stroke of {1e3 * depths[-1]:.3g} mm at {_place(centre - hand.radius * normal)} leaves the surface.",
+            f"A stroke of {1e3 * depths[-1]:.3g} mm at {_place(centre + hand.shift - hand.radius * normal)} leaves the surface.",
             why="The body lets go of a probe that is too deep, or comes nearer to another side.",
             fix=f"Give a smaller --depth; the deepest trained one is {1e3 * hand.deepest:.3g} mm.",
         )
@@ -137,12 +139,13 @@ def _press(
 
 def _nearest(hand: Touchable, surface: TouchedSurface, given: np.ndarray) -> str:
     """Return in words the nearest place of the surface: below a place near it, else among the nodes of the shape."""
-    distance, slope, _ = surface.at(given[None])
-    below = given - distance[0] * slope[0] / max(float(np.linalg.norm(slope[0])), _ROUNDING)
+    own = given - hand.shift
+    distance, slope, _ = surface.at(own[None])
+    below = own - distance[0] * slope[0] / max(float(np.linalg.norm(slope[0])), _ROUNDING)
     if abs(surface.at(below[None])[0][0]) <= surface.spacing:
-        return f"The nearest place of the surface is --at {_place(below)}."
+        return f"The nearest place of the surface is --at {_place(below + hand.shift)}."
     points = np.asarray(getattr(hand.fields.get("displacement"), "points", np.zeros((0, 3))))
-    touched = points[np.abs(surface.at(points)[0]) <= surface.spacing] if len(points) else points
+    touched = points[np.abs(surface.at(points - hand.shift)[0]) <= surface.spacing] if len(points) else points
     if not len(touched):
         low, high = surface.box
         return f"Give a place of the surface, which lies between {_place(low)} and {_place(high)}."

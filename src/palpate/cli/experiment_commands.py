@@ -77,8 +77,8 @@ def simulate(
     as_json: Json = False,
 ) -> None:
     """Try a plan on simulated people: coverage, bias, and power. The exit code is 1 if its power is missed."""
+    from palpate.experiments.experiment_plan import read_plan
     from palpate.experiments.outlook import foresee
-    from palpate.experiments.plan import read_plan
 
     console = Console(as_json)
     read = read_plan(plan)
@@ -123,7 +123,7 @@ def run_one(
     expertise: Annotated[str, typer.Option(help="Experience, as you define it.")] = "n/a",
 ) -> None:
     """Run a participant's sitting, on a page of theirs and a control page; one that was interrupted goes on."""
-    from palpate.experiments.live import run_sitting
+    from palpate.experiments.live_sitting import run_sitting
     from palpate.experiments.study_folder import Participant
     from palpate.viewer.web_server import way_in
 

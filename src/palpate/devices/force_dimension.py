@@ -287,7 +287,7 @@ class ForceDimensionDevice(Driver):
         self.traits = self.limited_traits(self.profile, source, max_force=force, **wrist)
 
     def _find_wrist(self) -> dict[str, Any]:
-        """Find out whether the handle tells its orientation, and whether motors turn it; take what reads and turns it."""
+        """Find out whether the handle tells its orientation and motors turn it; take the calls that do."""
         dhd, device = self._dhd, self._id
         needed = (
             "dhdHasWrist",

@@ -7,8 +7,10 @@ answer counts as lost and the latest force is sent; of several frames the newest
 tick old, and its time is that of the command it answers.
 
 Two spellings of a force are in use, ``vector`` and ``values``. The service is silent about one that it doesn't know.
-A grip tells how it is turned; none of these devices renders a torque. The driver proves itself by the echoed force: an echo that stays zero for 50 commands makes it try the other spelling,
+The driver proves itself by the echoed force: an echo that stays zero for 50 commands makes it try the other spelling,
 once. A service that echoes nothing is asked of its user. What the frames say is read in `haply_frames`.
+
+A grip tells how it is turned; none of these devices renders a torque.
 
 Only the thread that calls `read` and `write` is used; no call waits for longer than `HaplySettings.wait`.
 """

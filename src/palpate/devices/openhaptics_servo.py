@@ -168,7 +168,7 @@ def servo() -> Any:
 
 @part
 def _choose_force(box, written, wrench):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    """Take a force and torque (6,) that was written whole, and zero where the loop is silent or has not answered to a stop."""
+    """Take force and torque (6,) that were written whole, and zero where the loop is silent or a stop unanswered."""
     if written == box[WRITTEN] and written % 2.0 == 0.0:
         for i in range(_WRENCH):
             box[PUSH + i] = wrench[i]

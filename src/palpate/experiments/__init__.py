@@ -18,6 +18,7 @@ All of it was tried on simulated observers and scripted participants only.
 
 from palpate.experiments.analysis import Analysis, analyse
 from palpate.experiments.course import Course
+from palpate.experiments.experiment_plan import Plan, read_plan
 from palpate.experiments.groups import (
     Equivalence,
     GroupMean,
@@ -28,7 +29,6 @@ from palpate.experiments.groups import (
 )
 from palpate.experiments.observers import Observer
 from palpate.experiments.placement import Adaptive, Constant, Staircase
-from palpate.experiments.plan import Plan, read_plan
 from palpate.experiments.psychometric import JND, Answers, Estimate, Goodness, Psychometric
 from palpate.experiments.simulation import Simulated, simulate_course
 from palpate.experiments.stimuli import stiffened

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.experiments.experiment_plan import Plan
 from palpate.experiments.groups import Equivalence, GroupMean, deviation_of, equivalence, group_mean
-from palpate.experiments.plan import Plan
 from palpate.experiments.psychometric import Answers
 from palpate.experiments.study_folder import StudyFolder, read_table
 
-__all__ = ["Analysis", "PersonResult", "analyse"]
+__all__ = ["Analysis", "GroupResult", "PersonResult", "analyse"]
 
 _FEW = 20  # counted answers below which a person isn't fitted
 _ATTENDS = 0.75  # of the catch trials, below which it is said

@@ -40,23 +40,9 @@ class Clocks:
 class AppendRecord:
     """A file of events that one process at a time appends to; a context manager that lets go of it.
 
-    `events` are those read and added. A missing file is made with a first event ``begun``; what is there is kept.
-
-    Parameters
-    ----------
-    path : path
-        File of the events, for example ``events.jsonl``.
-    clocks : Clocks
-        Where the time comes from; the machine's by default.
-
-    Raises
-    ------
-    UsageError
-        If another process holds the record.
-    FileFormatError
-        If the file holds no events.
-    ResourceError
-        If the disk is full or the folder write-protected; so do `add` and all that writes.
+    `events` are those read and added. A missing file is made; what is there is kept. The time comes from `clocks`, by
+    default the machine's. A record that another process holds is a UsageError, a file without events a
+    FileFormatError, a full disk or a protected folder a ResourceError, also of `add`.
     """
 
     def __init__(self, path: str | os.PathLike[str], clocks: Clocks | None = None) -> None:
@@ -134,12 +120,7 @@ class AppendRecord:
 def read_events(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
     """Return the whole events of a record in their order; lines that were cut off are left out.
 
-    Raises
-    ------
-    FileFormatError
-        If there is text, but no event in it.
-    ResourceError, UsageError
-        If the file can't be read.
+    A file with text, but no event in it, is a FileFormatError.
     """
     path = Path(path)
     with system_errors(f"The record {path} could not be read."):

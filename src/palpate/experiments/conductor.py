@@ -18,12 +18,13 @@ import numpy as np
 
 from palpate.devices import device_traits
 from palpate.errors import PalpateError, UsageError
-from palpate.experiments.plan import Plan
+from palpate.experiments.experiment_plan import Plan
 from palpate.experiments.sitting import Sitting, Trial
 from palpate.experiments.stimuli import Felt, Stimuli
 from palpate.experiments.study_folder import SittingFiles
 from palpate.runtime import LoopProcess
 from palpate.runtime.shared_state import now
+from palpate.runtime.touchable import Touchable
 
 __all__ = ["Conductor"]
 
@@ -97,6 +98,7 @@ class Conductor:
         stroke = body.stroke(loop.scale)
         way = (stroke["x"], stroke["y"], stroke["z"]) if stroke else (0.0, -1.0, 0.0)
         self._way = np.array(way) * self._target * _BEYOND / loop.scale
+        self._full = min(plan.device.max_force, _largest_force(body, self._target * _BEYOND, plan.vary.high))
 
     # ------------------------------------------------------------------ what pages say
 
@@ -147,7 +149,7 @@ class Conductor:
                 view["depth"] = round(max(0.0, self._depth) / self._target, 3)
                 view["beyond"] = _BEYOND
                 if self.by_page:
-                    view["force"] = round(self._force / self.plan.device.max_force, 3)
+                    view["force"] = round(self._force / self._full, 3)
             if self.phase == "question":
                 view |= {
                     "ask": self.plan.asked,
@@ -369,6 +371,16 @@ class Conductor:
     def _finish(self, words: str) -> None:
         self._drop("The sitting ended.")
         self.words, self.phase = words, "done"
+
+
+def _largest_force(body: Touchable, depth: float, ratio: float) -> float:
+    """Return the force (N) that fills the page's bar: of the reference at a depth, times the largest ratio."""
+    if body.holds:
+        return body.force_max * ratio
+    place = (body.home - depth * body.normal)[: len(body.inputs) - len(body.parameters)]
+    x = np.concatenate([place, [(r.low + r.high) / 2.0 for r in body.parameters]])
+    force = float(np.linalg.norm(body.energy.force(x[None])[0])) * max(ratio, 1.0)
+    return force or body.force_max
 
 
 def _ratings(answer: Any, count: int) -> list[int] | None:

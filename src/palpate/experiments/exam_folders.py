@@ -82,13 +82,7 @@ class PastExamination:
 
     @classmethod
     def read(cls, folder: Path) -> PastExamination:
-        """Read it from its folder.
-
-        Raises
-        ------
-        UsageError
-            If there is none.
-        """
+        """Read it from its folder; one without an examination is a UsageError."""
         try:
             events = read_events(folder / EVENTS)
         except PalpateError as error:

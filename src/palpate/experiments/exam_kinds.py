@@ -86,25 +86,14 @@ def hide_lumps(
 ) -> tuple[Lump, ...]:
     """Return the lumps of an examination, the same for the same seed; one in five examinations has none.
 
-    Sizes, depths and moduli are drawn without putting one back, so that each examination asks of all kinds evenly.
-
-    Parameters
-    ----------
-    kind : ExamKind
-        Sizes of lumps.
-    body : Touchable
-        The body without lumps.
-    surface : ExamSurface
-        Its surface, under which they are hidden.
-    seed : int
-        Of the draw.
-    learnt : LumpContrast, optional
-        The lumps that the body has learnt: only such are hidden then.
+    Sizes, depths and moduli are drawn without putting one back, so that each examination asks of all kinds evenly. The
+    lumps lie under the `surface` of the `body` without lumps; where it has `learnt` lumps, only such are hidden.
     """
     rng = np.random.default_rng(seed)
     touched = surface.inner(max(kind.diameters) / 2.0)  # so that a hand can press all around a lump
     if rng.random() < _NONE or not len(touched) or body.surface is None:
         return ()
+    shares = surface.areas[touched] / surface.areas[touched].sum()
     _, slope, _ = body.surface.at(surface.points[touched])
     normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
     sorts = _sorts(kind, learnt)
@@ -112,7 +101,7 @@ def hide_lumps(
     lumps: list[Lump] = []
     for diameter, cover, ratio in (sorts[k] for k in order):
         for _ in range(_TRIES):
-            k = int(rng.integers(len(touched)))
+            k = int(rng.choice(len(touched), p=shares))
             below = rng.uniform(*cover) + diameter / 2.0
             x, y, z = (surface.points[touched[k]] - below * normals[k]).tolist()
             lump = Lump((x, y, z), diameter / 2.0, ratio)
@@ -143,7 +132,7 @@ def _fits(body: Touchable, lump: Lump, surface: ExamSurface, learnt: LumpContras
     try:
         require_inside(body, lump, surface.points)
         if learnt is not None:
-            learnt.require(body.energy, [lump])
+            learnt.require([lump])
     except UsageError:
         return False
     return True

@@ -35,6 +35,7 @@ __all__ = [
     "place_of",
     "require_inside",
     "schematic_lumps",
+    "skin_under",
 ]
 
 LEAST_COVER = 0.001  # m of tissue over a lump: thinner, it would be seen
@@ -59,16 +60,28 @@ class LumpPlace:
 
 def place_of(body: Touchable, lump: Lump) -> LumpPlace:
     """Return where a lump lies under the touched surface of a body."""
-    surface = body.surface
-    if surface is None:
+    distance, normal = _above_skin(body, lump.place)
+    return LumpPlace(lump.place - distance * normal, normal, -distance - lump.radius)
+
+
+def skin_under(body: Touchable, place: Sequence[float]) -> tuple[float, float, float]:
+    """Return the point (3,) of the skin, m, that is nearest to a place (3,), such as the centre of the probe."""
+    if len(place) != 3 or not np.isfinite(place).all():
+        raise UsageError("A mark needs a place.", fix="Press the body where the mark shall be.")
+    distance, normal = _above_skin(body, place)
+    x, y, z = (np.asarray(place) - distance * normal).tolist()
+    return x, y, z
+
+
+def _above_skin(body: Touchable, place: Sequence[float]) -> tuple[float, np.ndarray]:
+    """Return the distance of a place (3,) from the skin, m, negative inside, and the outer normal (3,) there."""
+    if body.surface is None:
         raise UsageError(
             f"{body.name} has no touched surface to hide a lump under.",
             fix="Take a body that a free probe presses.",
         )
-    place = np.array([lump.place])
-    distance, slope, _ = surface.at(place)
-    normal = slope[0] / np.linalg.norm(slope[0])
-    return LumpPlace(place[0] - distance[0] * normal, normal, float(-distance[0] - lump.radius))
+    distance, slope, _ = body.surface.at(np.array([place], float))
+    return float(distance[0]), slope[0] / np.linalg.norm(slope[0])
 
 
 def body_with_lumps(surrogate: Surrogate, body: Touchable, lumps: Sequence[Lump]) -> Surrogate:
@@ -84,10 +97,7 @@ def body_with_lumps(surrogate: Surrogate, body: Touchable, lumps: Sequence[Lump]
 def require_inside(body: Touchable, lump: Lump, points: np.ndarray) -> LumpPlace:
     """Return a lump's place; refuse one that leaves the body, whose surface has the points (N, 3), m.
 
-    Raises
-    ------
-    UsageError
-        If less than a millimetre of tissue covers the lump, or another side of the body is nearer than its radius.
+    It is a UsageError that less than a millimetre of tissue covers it, or another side is nearer than its radius.
     """
     at = place_of(body, lump)
     size = f"The {lump}"

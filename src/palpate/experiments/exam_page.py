@@ -31,7 +31,7 @@ from palpate.errors import PalpateError, UsageError
 from palpate.experiments.append_record import Clocks
 from palpate.experiments.exam_folders import exam_directory, past_examinations
 from palpate.experiments.exam_kinds import ExamKind, hide_lumps
-from palpate.experiments.exam_lumps import body_with_lumps, require_inside
+from palpate.experiments.exam_lumps import body_with_lumps, require_inside, skin_under
 from palpate.experiments.exam_practice import Practice
 from palpate.experiments.exam_report import score_page
 from palpate.experiments.exam_score import score_examination
@@ -68,36 +68,13 @@ _POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'
 class ExamPage(LocalServer):
     """The page of an examination, at `url` while the context lasts.
 
-    Parameters
-    ----------
-    kind : ExamKind
-        What is hidden, and the words for the examiner.
-    surrogate : Surrogate
-        The body without lumps, that a free probe presses.
-    directory : path, optional
-        Folder of the examinations; that of this user by default.
-    seed : int, optional
-        Of the lumps of the first examination, each further one has the next; by default at random.
-    lumps : sequence of Lump, optional
-        Lumps of every examination, in place of drawn ones.
-    device : str
-        Device of the hand; ``page`` is the page's own.
-    clocks : Clocks, optional
-        Where the times of records come from; the machine's by default.
-    port, host, strict_port, token : int, str, bool, bool
-        As for `Viewer`.
+    `surrogate` is the body without lumps, which a free probe presses; `kind` says what is hidden. Examinations are kept
+    in `directory`, by default this user's. `seed` is that of the first one's lumps, and each further one has the
+    next; by default it is random. `lumps` are hidden in every examination in place of drawn ones. `device` names that
+    of the hand, ``page`` the page's own, and `clocks` give the times of records, by default the machine's. The server's
+    options are those of `Viewer`. `loop` is the real-time process, once started.
 
-    Attributes
-    ----------
-    loop : LoopProcess
-        The real-time process, once started.
-
-    Raises
-    ------
-    UsageError
-        If the body can't be pressed, or a lump leaves it.
-    DeviceError
-        On the start, if the device is missing.
+    A body that can't be pressed and a lump that leaves it are a UsageError, a missing device a DeviceError of `start`.
     """
 
     def __init__(
@@ -292,7 +269,7 @@ class ExamPage(LocalServer):
 
     def _mark(self, marked: Examination | Practice, wish: ExamWish) -> None:
         if wish.wish == "mark":
-            marked.mark(wish.place)
+            marked.mark(skin_under(self._body, wish.place))
         elif wish.wish == "answer":
             marked.answer(wish.number, hardness=wish.hardness, depth=wish.depth)
         elif wish.wish == "remove":

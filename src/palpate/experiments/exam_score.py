@@ -56,6 +56,10 @@ class LumpResult:
         """Whether it is hard or soft."""
         return "hard" if self.lump.ratio >= HARD else "soft"
 
+    def is_near(self, mark: Mark, radius: float) -> bool:
+        """Return whether a mark is near enough to find the lump with a probe of a radius, m."""
+        return bool(np.linalg.norm(self.at.above - mark.place) <= self.lump.radius + NEAR * radius)
+
     @property
     def off(self) -> float:
         """Distance of the mark from the place of the skin above the lump, m; not-a-number where it was missed."""
@@ -78,7 +82,7 @@ def match_marks(lumps: Sequence[LumpPlace], radii: Sequence[float], marks: Seque
 
 
 def share_interval(hits: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a probability of which `hits` of `count` trials tell (Wilson 1927)."""
+    """Return the 95 % interval of a probability with `hits` in `count` trials (Wilson 1927)."""
     if count == 0:
         return 0.0, 1.0
     z2, p = _NORMAL**2 / count, hits / count
@@ -104,9 +108,9 @@ class ExamScore:
 
     @property
     def false_alarms(self) -> tuple[Mark, ...]:
-        """Marks where there is no lump."""
-        right = {result.mark.number for result in self.results if result.mark is not None}
-        return tuple(mark for mark in self.marks if mark.number not in right)
+        """Marks where there is no lump; a second mark of a lump is none."""
+        radius = self.surface.radius
+        return tuple(mark for mark in self.marks if not any(r.is_near(mark, radius) for r in self.results))
 
     @cached_property
     def depths(self) -> np.ndarray:
@@ -180,19 +184,8 @@ def _share(results: Iterable[LumpResult]) -> tuple[int, int]:
 def score_examination(past: PastExamination, body: Touchable | None = None) -> ExamScore:
     """Return the score of an examination on this machine.
 
-    A mark finds a lump within the lump's radius and half the probe's of the place of the skin above it.
-
-    Parameters
-    ----------
-    past : PastExamination
-        The examination, ended or not.
-    body : Touchable
-        The body without lumps; read from its file by default.
-
-    Raises
-    ------
-    UsageError, FileFormatError
-        If the body's file is missing or damaged.
+    A mark finds a lump within the lump's radius and half the probe's of the place of the skin above it. `body` is the
+    one without lumps, by default read from its file; a missing or damaged file is a FileFormatError.
     """
     body = load_touchable(past.body) if body is None else body
     marks = standing_marks(past.events)

@@ -17,11 +17,13 @@ import numpy as np
 
 from palpate.devices.trace_file import Trace, read_trace
 from palpate.errors import PalpateError
+from palpate.units import bounds
 
 if TYPE_CHECKING:
     from palpate.runtime.touchable import Touchable
 
 __all__ = [
+    "LEVELS",
     "ExamSurface",
     "ExamTouch",
     "Press",
@@ -29,10 +31,16 @@ __all__ = [
     "order_of_search",
     "pressed_depths",
     "read_touch",
+    "search_path",
+    "typical_force",
 ]
 
 LEVELS = {"lightly": 0.2, "to the middle": 0.45, "deeply": 0.75}
 """Shares of the deepest trained press from which a place counts as pressed that deep."""
+_FINE, _MOST_CUTS = (
+    0.25,
+    5,
+)  # of the probe's radius, the longest edge of a surface; how often its triangles are cut
 _CONTACT = 1e-5  # m of depth from which the probe touches
 _SHORTEST = 0.05  # s; contacts that are shorter, or gaps between them, are no press and no end of one
 _EVERY = 0.02  # s between two places that are looked at for the surface
@@ -44,37 +52,37 @@ _CLEAR = 0.6  # share from which an order has a name
 
 @dataclass(frozen=True, eq=False)
 class ExamSurface:
-    """The surface of an examined body at rest.
+    """The surface of an examined body at rest."""
 
-    Attributes
-    ----------
-    points : (N, 3) array
-        Its points, m.
-    triangles : (k, 3) int array
-        Its triangles.
-    reachable : (N,) bool array
-        Points that a hand may press and that were trained: all others are no one's fault.
-    radius, deepest : float
-        Radius of the probe and deepest trained press, m.
-    """
-
-    points: np.ndarray
-    triangles: np.ndarray
-    reachable: np.ndarray
-    radius: float
-    deepest: float
+    points: np.ndarray  # (N, 3) m
+    triangles: np.ndarray  # (k, 3) int
+    reachable: np.ndarray  # (N,) bool: a hand may press there, and it was trained; all else is nobody's fault
+    radius: float  # of the probe, m
+    deepest: float  # trained press, m
 
     @classmethod
     def of(cls, body: Touchable) -> ExamSurface:
-        """Return the surface as the page draws it."""
-        from palpate.viewer.surface_drawing import SurfaceDrawing
-        from palpate.viewer.trust_map import trust_map
+        """Return the surface as the page draws it, with finer triangles where a hand may press.
 
-        drawing = SurfaceDrawing(body)
-        points = np.asarray(drawing.surface.rest, float).reshape(-1, 3)
-        triangles = np.asarray(drawing.surface.triangles, np.int64).reshape(-1, 3)
-        reachable = np.asarray(trust_map(drawing).values) >= 0.0
-        return cls(points, triangles, reachable, body.radius, body.deepest)
+        A point can be pressed where the body was trained for a ball that is half as deep as it may go.
+        """
+        from palpate.viewer.surface_drawing import SurfaceDrawing
+
+        surface, depth = SurfaceDrawing(body).surface, body.deepest / 2.0
+        points = np.asarray(surface.rest, float).reshape(-1, 3)
+        triangles = np.asarray(surface.triangles, np.int64).reshape(-1, 3)
+        touchable = np.asarray(surface.touchable) > 0
+        points, fine = _refined(points, triangles[touchable], _FINE * body.radius)
+        reachable = np.zeros(len(points), bool)
+        touched = np.unique(fine)
+        if body.surface is not None and len(touched):
+            distance, slope, _ = body.surface.at(points[touched])
+            normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
+            low, high = bounds(body.inputs)
+            X = np.tile((low + high) / 2.0, (len(touched), 1))
+            X[:, :3] = points[touched] + (body.radius - depth - distance)[:, None] * normals
+            reachable[touched] = body.energy.inside(X)
+        return cls(points, np.vstack([triangles[~touchable], fine]), reachable, body.radius, body.deepest)
 
     @cached_property
     def areas(self) -> np.ndarray:
@@ -114,6 +122,23 @@ class ExamSurface:
         whole = self.areas.sum()
         pressed = {name: self.areas[depths >= level * self.deepest].sum() for name, level in LEVELS.items()}
         return {name: float(area / whole) if whole > 0 else 0.0 for name, area in pressed.items()}
+
+
+def _refined(points: np.ndarray, triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return points, the old ones first, and triangles cut into four until no edge is longer than `longest`, m."""
+    for _ in range(_MOST_CUTS):
+        edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+        if not len(edges) or lengths.max() <= longest:
+            break
+        unique, which = np.unique(edges, axis=0, return_inverse=True)
+        middle = len(points) + which.reshape(-1, 3)
+        points = np.vstack([points, points[unique].mean(axis=1)])
+        (a, b, c), (ab, bc, ca) = triangles.T, middle.T
+        triangles = np.concatenate(
+            [np.stack(corners, axis=1) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        )
+    return points, triangles
 
 
 @dataclass(frozen=True)
@@ -201,9 +226,11 @@ def read_touch(traces: Sequence[Path], body: Touchable) -> ExamTouch:
 
 
 def _columns(trace: Trace, began: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    held = trace.flag("grabbed") & ~trace.flag("let_go")
-    depth = np.where(held, trace.ticks["depth"], 0.0).astype(float)
     force = np.linalg.norm(trace.ticks["force"], axis=1)
+    felt = trace.flag("grabbed") & (
+        force > 0.0
+    )  # a stop or a fault withholds the force: nothing is felt then
+    depth = np.where(felt, trace.ticks["depth"], 0.0).astype(float)
     return began + trace.time, np.array(trace.ticks["contact"]), depth, force
 
 
@@ -237,23 +264,13 @@ def pressed_depths(surface: ExamSurface, touch: ExamTouch) -> np.ndarray:
 
 @dataclass(frozen=True)
 class SearchOrder:
-    """The order in which a surface was searched, of steps between places half a probe's radius apart or more.
+    """The order in which a surface was searched, of steps between places half a probe's radius apart or more."""
 
-    Attributes
-    ----------
-    parallel : float
-        |Σ l e^{2iφ}| / Σ l of steps of length l and direction φ on the map: 1 for strips along one direction.
-    around : float
-        Share of the way that went around the middle of the places: 1 for circles, 0 for spokes.
-    again : float
-        Share of the places that were within a probe's radius of one visited more than 5 s before.
-    steps : int
-        Number of steps.
-    """
-
-    parallel: float
-    around: float
-    again: float
+    parallel: (
+        float  # |Σ l e^{2iφ}| / Σ l of steps of length l and direction φ on the map: 1 for parallel strips
+    )
+    around: float  # share of the way that went around the middle of the places: 1 for circles, 0 for spokes
+    again: float  # share of the places within a probe's radius of one visited more than 5 s before
     steps: int
 
     @property

@@ -33,12 +33,8 @@ class Mark:
 class Examination:
     """An examination in its folder; a context manager that lets go of its record.
 
-    `begin` makes one, `resume` goes on with one that was interrupted. `marks` are those that stand now.
-
-    Raises
-    ------
-    UsageError
-        If another process holds the record, or the examination has ended.
+    `begin` makes one, `resume` goes on with one that was interrupted; one that has ended, or that another process
+    holds, is a UsageError. `marks` are those that stand now.
     """
 
     def __init__(self, folder: Path, clocks: Clocks | None = None) -> None:
@@ -57,22 +53,9 @@ class Examination:
         clocks: Clocks | None = None,
         **facts: Any,
     ) -> Self:
-        """Begin an examination of a body's file with hidden lumps, in a new folder of a directory.
+        """Begin an examination in a new folder of a directory, with lumps hidden in a body, whose file has none.
 
-        Parameters
-        ----------
-        directory : path
-            Folder of the examinations.
-        kind : ExamKind
-            Sizes and words.
-        body : path
-            File of the body without lumps.
-        lumps : lumps
-            Those that are hidden.
-        clocks : Clocks
-            Where the time comes from; the machine's by default.
-        **facts
-            What else its first event says: seed, device.
+        `facts` are what else its first event says: seed, device.
         """
         clocks = clocks or Clocks()
         kept = keep_body(directory, body)

@@ -23,7 +23,15 @@ from palpate.experiments.course import Course
 from palpate.experiments.observers import Observer
 from palpate.experiments.simulation import simulate_people
 
-__all__ = ["Equivalence", "GroupMean", "Population", "equivalence", "group_mean", "power_curve"]
+__all__ = [
+    "Equivalence",
+    "GroupMean",
+    "Population",
+    "deviation_of",
+    "equivalence",
+    "group_mean",
+    "power_curve",
+]
 
 _LARGEST = 1e6  # τ² over the largest variance: beyond all that data show
 

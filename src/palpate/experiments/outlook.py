@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.experiments.experiment_plan import Plan
 from palpate.experiments.groups import power_curve
-from palpate.experiments.plan import Plan
 from palpate.experiments.simulation import Simulated, simulate_course
 
 __all__ = ["Outlook", "foresee"]

@@ -1,8 +1,8 @@
 """Placement of the stimuli: which level comes next, for one person who sits there or for many simulated ones at once.
 
 Every placement works on indices of a sorted array of levels. `start` gives the state of N people, `choose` the index of
-each one's next level, `learn` takes their answers. Only the state changes: a run that was interrupted is brought back by
-its answers.
+each one's next level, `learn` takes their answers. Only the state changes, so the answers bring back an
+interrupted run.
 
     Constant    every level equally often, in blocks of random order (method of constant stimuli)
     Staircase   up after a mistake, down after some right answers in a row; with unequal steps it is weighted

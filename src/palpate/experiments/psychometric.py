@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Literal, TypeAlias
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -29,12 +29,18 @@ from palpate.errors import UsageError
 
 __all__ = ["JND", "Answers", "Estimate", "Goodness", "Psychometric"]
 
+_Axes: TypeAlias = tuple[np.ndarray, ...]
+
 JND = 0.6744897501960817  # Φ⁻¹(¾)
 LAPSES = (0.0, 0.06)  # Wichmann & Hill 2001
 _SIDE = 1 / 6  # largest side preference, over the span of the levels
 _NARROWEST, _WIDEST = 1 / 25, 2.0  # σ over the span of the levels
 _NODES = 4_000_000  # numbers that a chunk of people holds at once
 _FINER = 8  # points of a marginal between two nodes of the grid
+_SHOWN, _FINE = (0, 1, 2, 4), (0, 1, 4)  # axes with a marginal: μ, ln σ, λ, b; and those made finer
+_COARSE = 0.5  # steps of a grid: a posterior narrower than that is not drawn by it
+_REFINEMENTS = 6
+_COARSE_POINTS = 19  # of a grid on which hundreds of repetitions are fitted
 _LEAST = 1e-9  # probability that is never certain
 
 
@@ -160,7 +166,7 @@ class Psychometric:
             return np.asarray(lapse / 2.0 + (1.0 - lapse) * core)
         return np.asarray(guess + (1.0 - guess - lapse) * core)
 
-    def axes(self, levels: np.ndarray) -> tuple[np.ndarray, ...]:
+    def axes(self, levels: np.ndarray) -> _Axes:
         """Return the nodes of μ, ln σ, λ, γ and b for the span of these levels."""
         low, high = float(levels.min()), float(levels.max())
         span = high - low
@@ -176,48 +182,81 @@ class Psychometric:
         guess = np.array([0.0]) if self._signed else _nodes(self.guess, 7)
         return mu, spread, _nodes(self.lapse, 5), guess, side
 
-    def _log_probabilities(self, answers: Answers) -> tuple[tuple[np.ndarray, ...], np.ndarray, np.ndarray]:
-        """Return the axes, and ln p and ln(1 − p) (R, G) of each stimulus at each node."""
-        axes = self.axes(answers.level)
+    def _log_probabilities(self, answers: Answers, axes: _Axes) -> tuple[np.ndarray, np.ndarray]:
+        """Return ln p and ln(1 − p) (R, G) of each stimulus at each node of a grid."""
         mu, spread, lapse, guess, side = (a.ravel() for a in np.meshgrid(*axes, indexing="ij"))
         p = self.probability(
             answers.level[:, None], mu, np.exp(spread), lapse, guess, side * answers.order[:, None]
         )
         p = np.clip(p, _LEAST, 1.0 - _LEAST)
-        return axes, np.log(p), np.log1p(-p)
+        return np.log(p), np.log1p(-p)
 
     def _log_prior(self, lapse: np.ndarray) -> np.ndarray:
         """Return the logarithm of the prior of the lapse rate at its nodes, for a grid of all five."""
         if np.ndim(self.lapse) == 0:
             return np.zeros(1)
-        return np.log(np.max(self.lapse) - lapse)[:, None, None]
+        return np.asarray(np.log(np.max(self.lapse) - lapse)[:, None, None])
 
     def estimate(self, answers: Answers, share: float = 0.95) -> Estimate:
-        """Return medians and intervals of that posterior share, and the most likely values, of all people."""
-        axes, on, off = self._log_probabilities(answers)
-        sizes = tuple(len(a) for a in axes)
+        """Return medians and intervals of that posterior share, and the most likely values, of all people.
+
+        Who has answered so often that the grid is too coarse for them gets a finer one of their own.
+        """
+        axes = self.axes(answers.level)
         tails = np.array([(1.0 - share) / 2.0, 0.5, (1.0 + share) / 2.0])
-        prior = self._log_prior(axes[2])
-        parts = []
+        marginals, best = self._marginals(answers, axes)
+        edge = marginals[1][:, [0, -1]].sum(axis=1) / marginals[1].sum(axis=1)
+        quantiles = [_quantiles(axes[k], m, tails) for k, m in marginals.items()]
+        for person in np.flatnonzero(_steps(marginals) < _COARSE):
+            own = Answers(answers.level, answers.order, answers.yes[[person]], answers.total[[person]])
+            finer, values, best[person] = self._refined(
+                own, axes, {k: m[[person]] for k, m in marginals.items()}
+            )
+            for place, k in enumerate(marginals):
+                quantiles[place][person] = _quantiles(finer[k], values[k], tails)[0]
+        mu, spread, lapse, side = quantiles
+        return Estimate(mu, (JND if self._signed else 1.0) * np.exp(spread), lapse, side, best, edge)
+
+    def _marginals(self, answers: Answers, axes: _Axes) -> tuple[dict[int, np.ndarray], np.ndarray]:
+        """Return the posterior (N, nodes) of μ, ln σ, λ and b by axis, and the most likely values (N, 5)."""
+        on, off = self._log_probabilities(answers, axes)
+        sizes, prior = tuple(len(a) for a in axes), self._log_prior(axes[2])
+        parts, tops = list[list[np.ndarray]](), list[np.ndarray]()
         for rows in _chunks(len(answers.yes), on.shape[1]):
             yes, total = answers.yes[rows], answers.total[rows]
             log = (yes @ on + (total - yes) @ off).reshape(-1, *sizes) + prior
             flat = log.reshape(len(log), -1)
             top = flat.argmax(axis=1)
-            flat = np.exp(flat - flat[np.arange(len(flat)), top][:, None])
-            weights = flat.reshape(-1, *sizes)
-            marginals = [weights.sum(axis=tuple(j + 1 for j in range(5) if j != k)) for k in (0, 1, 2, 4)]
-            index = np.unravel_index(top, sizes)
-            best = np.stack([a[i] for a, i in zip(axes, index, strict=True)], axis=1)
-            best[:, 1] = np.exp(best[:, 1])
-            ends = marginals[1][:, [0, -1]].sum(axis=1) / marginals[1].sum(axis=1)
-            quantiles = [_quantiles(axes[k], m, tails) for k, m in zip((0, 1, 2, 4), marginals, strict=True)]
-            parts.append([*quantiles, best, ends])
-        mu, spread, lapse, side, best, edge = (np.concatenate(column) for column in zip(*parts, strict=True))
-        scale = JND if self._signed else 1.0
-        return Estimate(mu, scale * np.exp(spread), lapse, side, best, edge)
+            weights = np.exp(flat - flat[np.arange(len(flat)), top][:, None]).reshape(-1, *sizes)
+            parts.append([weights.sum(axis=tuple(j + 1 for j in range(5) if j != k)) for k in _SHOWN])
+            tops.append(top)
+        index = np.unravel_index(np.concatenate(tops), sizes)
+        best = np.stack([a[i] for a, i in zip(axes, index, strict=True)], axis=1)
+        best[:, 1] = np.exp(best[:, 1])
+        joined = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return dict(zip(_SHOWN, joined, strict=True)), best
 
-    def goodness(self, answers: Answers, seed: int = 0, repeats: int = 500) -> Goodness:
+    def _refined(
+        self, own: Answers, axes: _Axes, marginals: dict[int, np.ndarray]
+    ) -> tuple[_Axes, dict[int, np.ndarray], np.ndarray]:
+        """Return a grid about one person's posterior, that posterior, and the most likely values (5,)."""
+        best = np.zeros((1, 5))
+        for _ in range(_REFINEMENTS):
+            if _steps(marginals)[0] >= _COARSE:
+                break
+            finer = list(axes)
+            for k in _FINE:
+                if len(axes[k]) > 1:
+                    step, w = axes[k][1] - axes[k][0], marginals[k][0] / marginals[k][0].sum()
+                    middle = float(w @ axes[k])
+                    half = 5.0 * max(float(np.sqrt(w @ (axes[k] - middle) ** 2)), 0.3 * step)
+                    low, high = max(axes[k][0], middle - half), min(axes[k][-1], middle + half)
+                    finer[k] = np.linspace(low, high, len(axes[k]))
+            axes = tuple(finer)
+            marginals, best = self._marginals(own, axes)
+        return axes, marginals, best[0]
+
+    def goodness(self, answers: Answers, seed: int = 0, repeats: int = 200) -> Goodness:
         """Return the deviance of the first person's answers, and its p-value by so many simulated repetitions.
 
         Each repetition has the same stimuli, answers of the most likely function, and is fitted anew. Of adaptively
@@ -228,7 +267,8 @@ class Psychometric:
         own = Answers(level, order, answers.yes[:1, asked], total)
         if len(np.unique(level)) < 2:
             return Goodness(0.0, 1.0)
-        _, on, off = self._log_probabilities(own)
+        coarse = replace(self, points=_COARSE_POINTS)  # the same for the answers and their repetitions
+        on, off = coarse._log_probabilities(own, coarse.axes(own.level))
         best = int((own.yes @ on + (total - own.yes) @ off)[0].argmax())
         rng = np.random.default_rng(seed)
         drawn = rng.binomial(total[0].astype(int), np.exp(on[:, best]), (repeats, len(level))).astype(float)
@@ -240,6 +280,18 @@ class Psychometric:
         perfect = (xlogy(yes, share) + xlogy(total - yes, 1.0 - share)).sum(axis=1)
         deviance = 2.0 * (perfect - fitted)
         return Goodness(float(deviance[0]), float((1 + (deviance[1:] >= deviance[0]).sum()) / (1 + repeats)))
+
+
+def _steps(marginals: dict[int, np.ndarray]) -> np.ndarray:
+    """Return the least standard deviation (N,) of the posteriors of μ, ln σ and b, in steps of their grids."""
+    least = np.full(len(marginals[0]), np.inf)
+    for k in _FINE:
+        nodes = np.arange(marginals[k].shape[1])
+        if len(nodes) > 1:
+            weights = marginals[k] / marginals[k].sum(axis=1, keepdims=True)
+            mean = weights @ nodes
+            least = np.minimum(least, np.sqrt(np.maximum(weights @ nodes**2 - mean**2, 0.0)))
+    return least
 
 
 def _nodes(value: float | tuple[float, float], count: int) -> np.ndarray:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate.experiments.course import Next
-from palpate.experiments.plan import Plan
+from palpate.experiments.experiment_plan import Plan
 
 __all__ = ["Sitting", "Trial"]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.errors import UsageError
-from palpate.experiments.plan import Plan
+from palpate.experiments.experiment_plan import Plan
 from palpate.experiments.sitting import Trial
 from palpate.experiments.study_folder import checksum
 from palpate.files import writing

@@ -31,10 +31,10 @@ from pathlib import Path
 from typing import Any
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.experiments.plan import Plan, read_plan
+from palpate.experiments.experiment_plan import Plan, read_plan
 from palpate.files import system_errors, write_file
 
-__all__ = ["Participant", "SittingFiles", "StudyFolder"]
+__all__ = ["Participant", "SittingFiles", "StudyFolder", "append_row", "checksum", "read_table"]
 
 MISSING = "n/a"
 

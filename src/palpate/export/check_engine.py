@@ -83,6 +83,16 @@ class CheckEngine:
             row[_FLAGS] = self._call("palpate_answer", x, row)
         return rows
 
+    def torques(self, X: np.ndarray) -> np.ndarray:
+        """Return the torque (N, 3) for each row of X (N, 3 + p)."""
+        rows, answer = np.empty((len(X), 3)), np.empty(19)
+        for row, x in zip(rows, np.ascontiguousarray(X), strict=True):
+            self._call("palpate_answer", x, answer)
+            force = answer[_FORCE].copy()
+            pointers = [x.ctypes.data, x[3:].ctypes.data, force.ctypes.data, row.ctypes.data]
+            self._calls.palpate_torque(self._body, *map(ctypes.c_void_p, pointers))
+        return rows
+
     def walk(self, X: np.ndarray) -> np.ndarray:
         """Return force, stored and lost energy (N, 5) of each step X (N, 1 + 3 + p)."""
         rows, answer, ledger = np.empty((len(X), 5)), np.empty(19), np.empty(4)

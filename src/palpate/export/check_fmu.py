@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.errors import ResourceError
 from palpate.export.check_points import ANSWERS, CONTACT, NOT_A_NUMBER, TOO_DEEP, TRUSTED
-from palpate.export.fmu_variables import ANSWER, ANSWER_DEVIATION
+from palpate.export.fmu_variables import ANSWER, ANSWER_DEVIATION, TORQUE
 
 __all__ = ["CheckFmu", "FmuInstance", "open_instance"]
 
@@ -201,6 +201,18 @@ class CheckFmu:
             inside, contact, deep = asked.flags()
             finite = np.isfinite(row[0])
             row[20] = TRUSTED * inside + CONTACT * contact + TOO_DEEP * deep if finite else NOT_A_NUMBER
+        return rows
+
+    def torques(self, X: np.ndarray) -> np.ndarray:
+        """Return the torque (N, 3) for each row of X (N, 3 + p)."""
+        rows = np.empty((len(X), 3))
+        self._places.begin()
+        for row, x in zip(rows, X.tolist(), strict=True):
+            if self._ways:  # a free probe is felt along x, y and z
+                self._places.restart([*self._ways, *self._parameters], x)
+            else:
+                self._places.write([*_PLACE, *self._parameters], x)
+            row[:] = self._places.read([TORQUE, TORQUE + 1, TORQUE + 2])
         return rows
 
     def _steer(self, X: np.ndarray) -> np.ndarray:

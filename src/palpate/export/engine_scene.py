@@ -27,9 +27,9 @@ def shown_mesh(surrogate: Surrogate) -> FieldSurrogate | None:
 
 
 def probe_radius(surrogate: Surrogate) -> float:
-    """Return the radius of the ball, m: the middle one of several, 0 of a body that is held."""
+    """Return the radius of the ball, m: the middle one of several, 0 of a body that is held or under another tool."""
     baseline = surrogate.hand_energy.baseline
-    if baseline.holds:
+    if baseline.holds or hasattr(baseline, "posed_tool"):
         return 0.0
     if baseline.radius_input is None:
         return float(baseline.radius)
@@ -42,6 +42,8 @@ def tool_words(surrogate: Surrogate) -> str:
     radius = probe_radius(surrogate)
     if surrogate.hand_energy.baseline.holds:
         return "The body is held where the tool starts."
+    if (tool := getattr(surrogate.hand_energy.baseline, "posed_tool", None)) is not None:
+        return f"It is a {tool}, its place being its foremost point."
     return f"It is a ball of {1e3 * radius:g} mm radius."
 
 
@@ -61,4 +63,5 @@ def press_ends(surrogate: Surrogate) -> tuple[np.ndarray, np.ndarray]:
     row = np.argsort(depth)[-max(1, int(np.isfinite(depth).sum()) // 20)]
     evaluate = energy.evaluator()
     evaluate(X[row, :3], middle[3:])
-    return X[row, :3] + (depth[row] + probe_radius(surrogate)) * evaluate.outward, X[row, :3].copy()
+    clear = probe_radius(surrogate) or float(depth[row])
+    return X[row, :3] + (depth[row] + clear) * evaluate.outward, X[row, :3].copy()

@@ -143,10 +143,18 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
         **{SURFACE + i: known[BASELINE + 1 + i] for i in range(3)},
     }
     if mode is not None:
-        tables |= {FIELD + 5: Table.of(mode.table), FIELD + 6: Table.of(nodes), FIELD + 7: Table.of(points)}
+        # the core's contact points lie on the surface that takes places: a field's own less its shift
+        shift = np.array(shown.shift)
+        tables |= {
+            FIELD + 5: Table.of(mode.table),
+            FIELD + 6: Table.of(nodes),
+            FIELD + 7: Table.of(points - shift),
+        }
         if mode.variation is not None:
             varied = mode.variation
             q, m = varied.table.shape[:2]
-            arrays = (varied.table.reshape(q * m, -1), varied.powers, varied.axes, varied.scales)
+            scales = varied.scales.copy()
+            scales[0, : len(varied.axes)] -= varied.axes @ shift
+            arrays = (varied.table.reshape(q * m, -1), varied.powers, varied.axes, scales)
             tables |= {VARIED + i: Table.of(a) for i, a in enumerate(arrays)}
     return tables

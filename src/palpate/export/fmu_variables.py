@@ -30,13 +30,14 @@ __all__ = [
 
 PARAMETER, STATE, FLAGS, SCALE = 16, 64, 12, 9  # value references, as in core/fmi_instance.c
 DAMPING, MASS, LIGHT = 48, 49, 0.05  # the last is the start of MASS, kg: a light tool
-PUSH, SPEED, KINETIC, ANSWER, ANSWER_DEVIATION = 50, 53, 56, 1024, 1 << 25
+PUSH, SPEED, KINETIC, TORQUE, ANSWER, ANSWER_DEVIATION = 50, 53, 56, 57, 1024, 1 << 25
 _MOST_STATES = 2000  # solvers keep a square matrix of them, and each is described by two variables
 _PLACES = (0, 1, 2)
 _UNITS: Mapping[str, str] = {
     "m": 'm="1"',
     "N": 'kg="1" m="1" s="-2"',
     "J": 'kg="1" m="2" s="-2"',
+    "N.m": 'kg="1" m="2" s="-2"',
     "W": 'kg="1" m="2" s="-3"',
     "Pa": 'kg="1" m="-1" s="-2"',
     "N/m": 'kg="1" s="-2"',
@@ -246,6 +247,11 @@ def _outputs(surrogate: Surrogate) -> list[Variable]:
         _output("depth", "depth of the probe, negative in the air; or way of the hand", 7, "m"),
         _output("deviation", "standard deviation of the force relative to its size", 8, "1"),
     ]
+    if surrogate.torque_evaluator is not None:
+        rows += [
+            _output(f"t{axis}", f"torque on the tool about its place, {axis}", TORQUE + i, "N.m", felt)
+            for i, axis in enumerate("xyz")
+        ]
     if surrogate.memory is not None:
         rows += [
             _output("stored", "energy that can be had back", 10, "J", felt),

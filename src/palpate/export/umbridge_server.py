@@ -1,8 +1,8 @@
 """Learnt files as models of UM-Bridge, over HTTP on this machine: values, slopes, and actions of the Hessian.
 
 A body that is touched is served as ``energy`` (J) and ``force`` (N) of two vectors: the felt coordinates, then the
-further inputs, if there are any; under a tool that tells its torque, also as ``torque`` (N m, without slopes). Quantities are served under the names of their groups, a network alone as ``outputs``.
-All is in SI units.
+further inputs, if there are any; under a tool that tells its torque, also as ``torque`` (N m, without slopes).
+Quantities are served under the names of their groups, a network alone as ``outputs``. All is in SI units.
 """
 
 from __future__ import annotations

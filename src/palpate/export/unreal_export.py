@@ -80,6 +80,7 @@ def _plugin_files(surrogate: Surrogate, done: ExportedC, mesh: FieldSurrogate | 
     upper = name[0].upper() + name[1:]
     module = f"Palpate{upper}"
     parts = ["ELASTIC"] if memory is None else ["MEMORY"] + ["RELEASE"] * memory.moves_rest
+    parts.append("TORQUE" if surrogate.torque_evaluator is not None else "TORQUELESS")
     parts.append("SHAPELESS" if mesh is None else "FIELD")
     words = {
         "@TITLE@": surrogate.name,

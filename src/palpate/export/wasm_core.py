@@ -113,6 +113,15 @@ class WasmCore:
             row[:20] = self._read(self._call("answered"), 20)
         return out
 
+    def torques(self, X: np.ndarray) -> np.ndarray:
+        """Return the torque (N, 3) for each row of X (N, 3 + p)."""
+        out = np.empty((len(X), 3))
+        for row, x in zip(out, X, strict=True):
+            self._ask(x)
+            self._call("answer")
+            row[:] = self._read(self._call("torque"), 3)
+        return out
+
     def predict(self, X: np.ndarray, outputs: int) -> np.ndarray:
         """Return the outputs (N, m) of the network beside the body for each row of X (N, n)."""
         out = np.empty((len(X), outputs))
@@ -151,7 +160,7 @@ class WasmCore:
             numbers, modes = shape[FRAME + MOST + 1 :], len(field.modes)
             value += np.tensordot(numbers[:modes], field.modes, axes=1)
             if field.local_mode is not None:
-                _add_local(value, numbers[modes:], field, shape[2:5])
+                _add_local(value, numbers[modes:], field, shape[2:5] + np.array(field.shift))
         return out
 
 

@@ -74,7 +74,7 @@ HEAD, NUMBERS, LIMITS, POINTS, AXES, NET, ROOT, BASELINE, MEMORY, FIELD, FIELD_N
 )
 ANSWER_NETS, RUNS, MOTION = (NET, BASELINE, BASELINE + 5), 22, 60  # see core/answers.c, core/fmi_motion.c
 PLACES, DOUBTS, DOUBT_ARRAYS = 23, 36, 6  # see core/answers.c
-ARM_NET = 53  # see core/torque.c
+ARM_NET = 56  # see core/torque.c
 ROOM = 12  # arrays that a baseline may have, and a memory
 ENDLESS = 1e30  # number that stands for infinity
 FAR = 1e15  # coordinate of points that fill up a row
@@ -398,7 +398,14 @@ def _arm_tables(surrogate: Surrogate) -> dict[int, Table]:
     """Return the network of the torque per newton, where there is one; a torque by turns has no C form yet."""
     arm = surrogate.quantities.get(ARM)
     if arm is not None:
-        return net_tables(arm.network, ARM_NET, 0)
+        own, scales = net_tables(arm.network, 0, 0), net_tables(surrogate.hand_energy.network, 0, 0)[1]
+        if not np.array_equal(own[1].values, scales.values):
+            raise UsageError(
+                f"The torque of {surrogate.name!r} can't be exported.",
+                why="It was learnt over other ranges than the energy.",
+                fix="Learn both from one set of solves, as `palpate.learn` does.",
+            )
+        return {ARM_NET + i: own[place] for i, place in enumerate((0, 2, 3, 4))}
     if surrogate.torque_evaluator is None:
         return {}
     raise UsageError(

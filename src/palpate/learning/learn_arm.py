@@ -19,10 +19,18 @@ FEWEST = 20  # solves that a fit takes
 CLEAN = 1e-6  # of the largest arm: a component that is smaller everywhere is zero by symmetry
 
 
-def learn_arm(data: Dataset, inputs: tuple[Range, ...], options: FitOptions) -> Fitted | None:
+def learn_arm(
+    data: Dataset,
+    inputs: tuple[Range, ...],
+    options: FitOptions,
+    *,
+    matrices: np.ndarray | None = None,
+    about: np.ndarray | None = None,
+) -> Fitted | None:
     """Return the arm learnt from converged solves; None where they tell no torque, are too few, or turn the tool.
 
-    `inputs` are those of the energy beside which it is learnt.
+    `inputs` are those of the energy beside which it is learnt, `matrices` (k, 3, 3) the symmetry of body and tool, the
+    identity among it, and `about` (3,) the point that stays, m. An arm turns with the body; a mirror turns it round.
     """
     if "torque" not in data or turn_inputs(inputs):
         return None
@@ -36,4 +44,10 @@ def learn_arm(data: Dataset, inputs: tuple[Range, ...], options: FitOptions) -> 
     arm[:, largest <= CLEAN * largest.max()] = 0.0
     if not np.ptp(arm, axis=0).any():
         return None
-    return fit(data.X[rows], arm, list(inputs), list(ARM_OUTPUTS), options=options)
+    X = data.X[rows]
+    if matrices is not None and len(matrices) > 1:
+        point = np.zeros(3) if about is None else about
+        images = [((X[:, :3] - point) @ M.T + point, np.linalg.det(M) * arm @ M.T) for M in matrices]
+        X = np.vstack([np.hstack([places, X[:, 3:]]) for places, _ in images])
+        arm = np.vstack([turned for _, turned in images])
+    return fit(X, arm, list(inputs), list(ARM_OUTPUTS), options=options)

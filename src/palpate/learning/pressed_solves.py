@@ -28,9 +28,15 @@ from palpate.learning.painted_region import DEVIATION, PaintedRegion, painted_re
 from palpate.learning.recognised import Recognised, Request, recogniser
 from palpate.options import FieldOptions
 from palpate.surrogates import Baseline, ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
-from palpate.surrogates.baselines import OverlapBaseline, ToolBaseline, deepest_ball, depth_series
+from palpate.surrogates.baselines import (
+    OverlapBaseline,
+    PosedBaseline,
+    ToolBaseline,
+    deepest_ball,
+    depth_series,
+)
 from palpate.surrogates.learnt_torque import ARM
-from palpate.tools import PosedTool
+from palpate.tools import PosedTool, Sphere
 from palpate.units import Range
 
 __all__ = ["FEWEST", "PressedSolves", "is_pressed", "recognise_pressed"]
@@ -94,7 +100,9 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
     deepest = {"deepest": pressed.deepest or None}
     # a law that was asked for is taken as it is
     rivals = None if options.get("choose") is False else pressed.overlap_baselines
-    numbers = {} if pressed.tool is None else {ARM: partial(learn_arm, pressed.data, pressed.inputs)}
+    mirror = {"matrices": pressed.matrices, "about": pressed.about}
+    learn = partial(learn_arm, pressed.data, pressed.inputs, **mirror)
+    numbers = {} if pressed.tool is None else {ARM: learn}
     return Recognised(
         baseline,
         pressed.solves,
@@ -132,6 +140,8 @@ class PressedSolves:
     )
     tool: str | None = None  # description of a tool as JSON; None of a sphere
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # way from the place to the ball's centre, m
+    posed: bool = False  # whether which of the tool's points is the deepest depends on the inputs
+    angles: int = 0  # inputs after the place that are components of a rotation vector
 
     @classmethod
     def of(cls, data: Dataset, layout: Layout | None = None) -> PressedSolves:
@@ -155,16 +165,17 @@ class PressedSolves:
             shown = data["drawn_points"], data["drawn_triangles"]
             drawn = CarriedSurface.bind(*shown, points, own)
         which, tool = _radius_input(data), PosedTool.of(probe) if probe["type"] == TOOL else None
-        radius, shift = _ball(probe, tool, rest[triangles[touched]])
+        radius, shift, posed = _ball(probe, tool, rest[triangles[touched]])
         largest = radius if which is None else data.ranges[which].high
         radius = radius if which is None else (data.ranges[which].low + largest) / 2
         matrices, about = declared_symmetry(data)
+        angles = 0 if tool is None else len(tool.angles)
         element = data.provenance["problem"].get("element")
         return cls(
             data,
             radius,
             which,
-            (*widen_ranges(data.ranges[:3], matrices, about), *data.ranges[3:]),
+            _widened(data.ranges, matrices, about, angles),
             touched_surface(
                 data,
                 rest - shift,
@@ -184,6 +195,8 @@ class PressedSolves:
             drawn,
             None if tool is None else json.dumps(tool.describe(), sort_keys=True),
             (float(shift[0]), float(shift[1]), float(shift[2])),
+            posed,
+            angles,
         )
 
     @property
@@ -191,11 +204,13 @@ class PressedSolves:
         """The contact baseline to begin with: pad on body, crossing at a tenth of the radius."""
         law = ContactLaw("series", self.radius / 10.0)
         parts = law, self.surface, self.radius, self.radius_input, self.resolved
-        return ContactBaseline(*parts) if self.tool is None else ToolBaseline(*parts, self.tool)
+        if self.tool is None:
+            return ContactBaseline(*parts)
+        return (PosedBaseline if self.posed else ToolBaseline)(*parts, self.tool)
 
     def overlap_baselines(self) -> list[Baseline]:
         """Return the baselines by the ball's overlap; none over a flat surface, or where the radius is an input."""
-        if self.radius_input is not None:
+        if self.radius_input is not None or self.tool is not None:
             return []
         # elements of a surface's file are straight, and keep their middles beside it; a ball feels their flat faces
         straight = has_middles(self.data)
@@ -209,9 +224,19 @@ class PressedSolves:
     def solves(self) -> Solves:
         """Inputs, energies, forces and stiffnesses as learning takes them."""
         data = self.data
-        K = data.response_gradient[:, :3, :3] if "response_gradient" in data else None
+        felt = 3 + self.angles
+        K = data.response_gradient[:, :felt, :felt] if "response_gradient" in data else None
         symmetry = self.matrices if len(self.matrices) > 1 else np.zeros((0, 3, 3))
-        return Solves(data.X, data.potential_energy, data.response, K, self.inputs, symmetry, self.about)
+        return Solves(
+            data.X,
+            data.potential_energy,
+            data.response,
+            K,
+            self.inputs,
+            symmetry,
+            self.about,
+            angles=self.angles,
+        )
 
     @property
     def depth_series(self) -> np.ndarray:
@@ -252,6 +277,8 @@ class PressedSolves:
                 continue
             X, values = data.X[rows].copy(), solved[rows]
             X[:, :3] = self.about + (X[:, :3] - self.about) @ matrix.T
+            turned = slice(3, 3 + self.angles)
+            X[:, turned] = X[:, turned] @ (np.linalg.det(matrix) * matrix[: self.angles, : self.angles]).T
             values = values @ matrix.T if values.shape[2] == 3 else values
             places = self.about + (points - self.about) @ matrix.T
             # seen in a mirror, a triangle runs round the other way
@@ -260,23 +287,34 @@ class PressedSolves:
         return images
 
 
-def _ball(probe: Mapping[str, Any], tool: PosedTool | None, corners: np.ndarray) -> tuple[float, np.ndarray]:
+def _ball(
+    probe: Mapping[str, Any], tool: PosedTool | None, corners: np.ndarray
+) -> tuple[float, np.ndarray, bool]:
     """Return the radius in m of the ball whose depth counts, and the way (3,) in m from the place to its centre.
 
-    `corners` (t, 3, 3) are those of the touched triangles in m.
+    Of a tool of which no one point is the deepest at all inputs: the largest of two lengths that its size tells, no
+    way, and True. `corners` (t, 3, 3) are those of the touched triangles in m.
     """
     if tool is None:
-        return float(probe["radius"]), np.zeros(3)
+        return float(probe["radius"]), np.zeros(3), False
     a, b, c = np.moveaxis(corners, 1, 0)
     areas = np.cross(b - a, c - a)
     normal = areas.sum(axis=0) / np.linalg.norm(areas, axis=1).sum()
-    if np.linalg.norm(normal) > 1 - PLANE:
-        return deepest_ball(tool, normal)
-    raise UsageError(
-        f"A {tool.shape} on the curved surface {str(probe['touches'])!r} can't be learnt yet.",
-        why="Which of its points is the deepest changes over the surface.",
-        fix="Learn it on a plane surface, or press the curved one with a SphereProbe.",
-    )
+    if isinstance(tool.shape, Sphere):  # whichever way it is pressed
+        normal = np.array([0.0, 0.0, 1.0])
+    if tool.turns == "fixed" and np.linalg.norm(normal) > 1 - PLANE:
+        return *deepest_ball(tool, normal), False
+    return tool.shape.size, np.zeros(3), True
+
+
+def _widened(
+    ranges: tuple[Range, ...], matrices: np.ndarray, about: np.ndarray, angles: int
+) -> tuple[Range, ...]:
+    """Return the ranges of all mirror images, of the place and of so many angles after it."""
+    turns = np.linalg.det(matrices)[:, None, None] * matrices[:, :angles, :angles]
+    end = 3 + angles
+    turned = widen_ranges(ranges[3:end], turns, np.zeros(angles)) if angles else ()
+    return (*widen_ranges(ranges[:3], matrices, about), *turned, *ranges[end:])
 
 
 def _deepest(probe: Mapping[str, Any]) -> float:

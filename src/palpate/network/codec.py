@@ -338,10 +338,11 @@ class _Record:
         return value
 
     def _optional(self, name: str) -> bool:
-        """Return whether a file may lack a field: one that may be nothing, or a mapping that is empty by default."""
+        """Return whether a file may lack a field: one that may be nothing, an empty mapping, or a tuple by default."""
         if isinstance(self.forms[name], _ByName):
             return self.cls.__dataclass_fields__[name].default_factory is dict  # type: ignore[attr-defined]
-        return isinstance(self.forms[name], _Maybe) and getattr(self.cls, name, 0) is None
+        default = getattr(self.cls, name, 0)
+        return isinstance(default, tuple) or (isinstance(self.forms[name], _Maybe) and default is None)
 
     def _worth_sharing(self) -> bool:
         return not all(isinstance(form, _Scalar) for form in self.forms.values())

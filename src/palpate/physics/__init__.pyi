@@ -64,9 +64,11 @@ from .shapes import LayeredBlock as LayeredBlock
 from .shapes import Organ as Organ
 from .shapes import SurfacePatch as SurfacePatch
 from .shapes import Tube as Tube
+from .shapes.tool_file import read_tool as read_tool
 from .solid import Body as Body
 from .solid import BodyFamily as BodyFamily
 from .solid import FamilyProblem as FamilyProblem
+from .solid import LumpProblem as LumpProblem
 from .solid import SolidProblem as SolidProblem
 from .solid import SolidSolution as SolidSolution
 from .solid import Varied as Varied

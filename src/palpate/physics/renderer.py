@@ -21,6 +21,8 @@ from palpate.kernels import kernel
 from palpate.output_files import picture_metadata
 from palpate.physics import deformed
 from palpate.physics.deformed import Ball, NodalField
+from palpate.physics.tool_picture import outline_of, tool_surface
+from palpate.tools.tool_mesh import ToolMesh
 
 __all__ = ["Camera", "Picture", "draw_body", "draw_triangles", "palette", "plot_solution"]
 
@@ -104,7 +106,7 @@ def plot_solution(
     path : path, optional
         File to write at once.
     probe : bool, SphereProbe or ((x, y, z), radius)
-        Whether the solution's probe is drawn where it is, or which sphere, m.
+        Whether the solution's probe or tool is drawn where it is, or which sphere, m.
     fixed : tuple of str, optional
         Surfaces to mark as fixed, by default those that the solution knows of.
     cut : "x", "y", "z" or (point, normal), optional
@@ -142,6 +144,9 @@ def plot_solution(
 
     room = (size[0] - (BAR if field is not None else 0), size[1])
     around = [visible[:, :3], body.points[heights <= 0]]
+    tool = tool_surface(solution) if probe is True else None
+    if tool is not None and scale == 1.0:
+        around.append(tool.points)
     if sphere is not None and scale == 1.0:
         around += [sphere[0] + sphere[1] * side * np.eye(3) for side in (1, -1)]
     camera = Camera.around(np.concatenate(around), view, (SMOOTHING * room[0], SMOOTHING * room[1]))
@@ -151,6 +156,8 @@ def plot_solution(
     depth, image = draw_body(drawn, camera, None if field is None else (low, high))
     if sphere is not None:
         _draw_ball_beside(image, depth, sphere, camera)
+    if tool is not None:
+        _draw_tool_beside(image, depth, tool, camera)
 
     canvas = _Canvas(size, image, depth, camera, float(np.linalg.norm(np.ptp(body.points, axis=0))))
     towards = camera.axes[2]
@@ -161,6 +168,8 @@ def plot_solution(
     if outline:
         at_rest = deformed.outline(body.points, skin, towards)
         canvas.stroke(deformed.cut_lines(body.points, heights, at_rest), GHOST, 0.9, hidden=0.25)
+    if tool is not None:
+        canvas.stroke(outline_of(tool, towards), BALL, 1.1, hidden=0.25)
     if sphere is not None:
         canvas.stroke(deformed.circles(*sphere, towards), BALL, 1.1, hidden=0.25)
     rim, outward = deformed.rim(body, deformed.fixed_of(solution) if fixed is None else fixed)
@@ -282,6 +291,16 @@ def _draw_ball_beside(image: np.ndarray, depth: np.ndarray, sphere: Ball, camera
     beside = (x * x + y * y < 1) & ~np.isfinite(depth)
     x, y = x[beside], y[beside]
     image[beside] = _lit(STEEL, np.column_stack([x, y, np.sqrt(1 - x * x - y * y)]), shine=0.30)
+
+
+def _draw_tool_beside(image: np.ndarray, depth: np.ndarray, tool: ToolMesh, camera: Camera) -> None:
+    """Draw a tool beside the body, as a ball is."""
+    screen = np.ascontiguousarray(camera.project(tool.points)[tool.triangles])
+    corners = np.pad(tool.normals[tool.triangles], [(0, 0), (0, 0), (0, 1)])
+    own, seen = np.full(depth.shape, -np.inf), np.zeros((*depth.shape, 4))
+    draw_triangles(screen, np.ascontiguousarray(corners), own, seen)
+    beside = np.isfinite(own) & ~np.isfinite(depth)
+    image[beside] = _lit(STEEL, seen[beside][:, :3] @ camera.axes.T, shine=0.30)
 
 
 class _Canvas:

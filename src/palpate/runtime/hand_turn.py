@@ -22,24 +22,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from palpate.devices.device import Axes
+from palpate.devices.device import Axes, Traits
 from palpate.runtime.oscillation import OscillationWatch
 from palpate.runtime.passivity import PassivityController
 from palpate.runtime.safety import Limits, Safety
+from palpate.surrogates.learnt_torque import TURNS
+from palpate.tools.rotations import rotation_matrix, rotation_vector, swing_vector
 from palpate.units import Range
 
 __all__ = ["HandTurn", "TorqueOnHand", "rotation_of"]
 
 LEVER = 0.05  # m from the handle's axis to the fingers: a turn counts as the way there
 _NORM = 0.01  # by how much the length of a quaternion may differ from 1
-_FASTEST = 50.0  # rad/s: no wrist turns faster, and no two samples of hardware are farther apart
+_FASTEST, _LONGEST = 30.0, 0.01  # rad/s: no wrist turns faster; s of still samples that a leap may have
 _SHORTEST = 1e-3  # s between two samples
 _STILL = [0.0, 0.0, 0.0]
 _PATIENCE = 3  # impossible orientations in a row that are a fault
 _UPRIGHT = np.array(
     [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
 )  # hand's axes to those of a body with z up
-_TURNS = ("tip_rx", "tip_ry", "tip_rz")
 
 
 def rotation_of(quaternion: np.ndarray, matrix: np.ndarray) -> bool:
@@ -81,9 +82,23 @@ class HandTurn:
         self._to_body = np.ascontiguousarray(_UPRIGHT @ turn if upright else turn)
         self._hand, self._new, self._held = np.eye(3), np.eye(3), False
         names = [r.name for r in parameters]
-        self._inputs = [(names.index(name), k) for k, name in enumerate(_TURNS) if name in names]
+        self._inputs = [(names.index(name), k) for k, name in enumerate(TURNS) if name in names]
         self._ranges = [(parameters[i].low, parameters[i].high) for i, _ in self._inputs]
         self._axis = axis
+
+    @classmethod
+    def on(
+        cls, traits: Traits, upright: bool, parameters: Sequence[Range], axis: np.ndarray
+    ) -> HandTurn | None:
+        """Return the turn of a hand on a device; None where that neither tells a turn nor renders a torque."""
+        if not (traits.orients or traits.max_torque > 0.0):
+            return None
+        return cls(traits.axes, upright, parameters, axis)
+
+    @property
+    def turns_tool(self) -> bool:
+        """True where further inputs of the body turn its tool."""
+        return bool(self._inputs)
 
     def see(self, quaternion: np.ndarray, elapsed: float, *, holding: bool) -> None:
         """Take an orientation w, x, y, z in the device's axes, `elapsed` s after the one before."""
@@ -91,9 +106,9 @@ class HandTurn:
         self._since += elapsed
         whole = rotation_of(quaternion, self._new)
         new = P @ self._new @ P.T if whole else self._hand
-        change = new @ self._hand.T
-        step = _logarithm(change)
-        if not whole or (self._held and math.hypot(*step) > _FASTEST * max(self._since, _SHORTEST)):
+        change, span = new @ self._hand.T, min(max(self._since, _SHORTEST), _LONGEST)
+        step = rotation_vector(change)
+        if not whole or (self._held and math.hypot(*step) > _FASTEST * span):
             self._doubts += 1
             self.fault = self._doubts >= _PATIENCE
             self._held = self._held and not self.fault
@@ -115,9 +130,13 @@ class HandTurn:
             w = [0.0, 0.0, 0.0]
             for number, k in self._inputs:
                 w[k] = float(parameters[number])
-            self.tool = _exponential(w)
+            self.tool = rotation_matrix(np.array(w))
             return
-        w = _logarithm(self.tool) if len(self._inputs) == 3 else _swing(self._axis, self.tool @ self._axis)
+        w = (
+            rotation_vector(self.tool)
+            if len(self._inputs) == 3
+            else swing_vector(self._axis, self.tool @ self._axis)
+        )
         for (number, k), (low, high) in zip(self._inputs, self._ranges, strict=True):
             parameters[number] = min(max(w[k], low), high)
 
@@ -129,12 +148,16 @@ class HandTurn:
 class TorqueOnHand:
     """The torque that a device renders: limited, ramped, passive, and zero with the gate closed.
 
-    `torque` (3,), N m in the body's axes, is what is sent. `slack` (J) is the work that the hand has put into turns.
+    `torque` (3,), N m in the body's axes, is what is sent. Of a body whose energy changes with the turn, what a hand puts
+    in by one of force and torque may come back by the other: `work` and `way_work`, J, are what it has put in by turns
+    and by ways, and each ledger compares itself with the energy less what went in by the other.
     """
 
-    def __init__(self, max_torque: float, period: float, scale: float, mass: float) -> None:
+    def __init__(self, max_torque: float, period: float, scale: float, mass: float, *, shares: bool) -> None:
         self.torque = np.zeros(3)
-        self.work = 0.0
+        self.work = self.way_work = 0.0
+        self.shares = shares
+        self._hand = np.zeros(3)
         self._scale = scale
         self._safety = Safety(Limits(max_torque), period, self.torque)
         self.passivity = PassivityController(period, max_force=max_torque / LEVER, mass=mass)
@@ -142,12 +165,28 @@ class TorqueOnHand:
         self._place, self._force, self._wanted = np.zeros(3), np.zeros(3), np.zeros(3)
         self._last = np.zeros(3)
 
+    @classmethod
+    def by(
+        cls, turn: HandTurn | None, max_torque: float, period: float, scale: float, mass: float
+    ) -> TorqueOnHand | None:
+        """Return the torque of a device whose hand's turn is known; None where it renders none."""
+        if turn is None or not max_torque > 0.0:
+            return None
+        return cls(max_torque, period, scale, mass, shares=turn.turns_tool)
+
+    def count_way(self, force: np.ndarray, hand: np.ndarray) -> None:
+        """Count the work on the way to a hand's place (3,), m, of the force (3,), N, that was sent before."""
+        a, b, c = force.tolist()
+        x, y, z = (hand - self._hand).tolist()
+        self.way_work -= a * x + b * y + c * z
+        self._hand[:] = hand
+
     def send(
         self, wanted: np.ndarray, angle: np.ndarray, elapsed: float, stored: float, *, gate: bool, free: bool
     ) -> bool:
         """Renew `torque` from that of the tool (3,), N m, at the hand's `angle` (3,), rad; return False if it swings.
 
-        `stored` is the energy that the body can give back to turns, J.
+        `stored` is the energy that the body holds, J; that of one that does not change with the turn gives none back.
         """
         np.divide(wanted, self._scale, out=self._wanted)
         x, y, z = (angle - self._last).tolist()
@@ -160,8 +199,9 @@ class TorqueOnHand:
         self._safety.apply(self._wanted, gate=True)
         np.multiply(angle, LEVER, out=self._place)
         np.divide(self.torque, LEVER, out=self._force)
-        clamped = self._safety.clamped
-        self.passivity.apply(self._place, self._force, elapsed, stored=stored, clamped=clamped, free=free)
+        # one that states no energy is in debt by whatever it gives
+        clamped, left = self.shares and self._safety.clamped, stored - self.way_work if self.shares else 0.0
+        self.passivity.apply(self._place, self._force, elapsed, stored=left, clamped=clamped, free=free)
         if self.passivity.damping > 0.0:
             np.multiply(self._force, LEVER, out=self.torque)
         if self._safety.slew():
@@ -177,36 +217,3 @@ class TorqueOnHand:
         self._safety.stop()
         self.passivity.interrupt()
         self._watch.reset()
-
-
-def _logarithm(R: np.ndarray) -> list[float]:
-    """Return the rotation vector of a rotation (3, 3), rad, of an angle below π."""
-    x, y, z = float(R[2, 1] - R[1, 2]), float(R[0, 2] - R[2, 0]), float(R[1, 0] - R[0, 1])
-    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
-    cosine = 0.5 * (float(R[0, 0] + R[1, 1] + R[2, 2]) - 1.0)
-    factor = 0.5 if sine < 1e-8 else 0.5 * math.atan2(sine, cosine) / sine
-    return [factor * x, factor * y, factor * z]
-
-
-def _exponential(w: Sequence[float]) -> np.ndarray:
-    """Return the rotation (3, 3) of a rotation vector in rad, by Rodrigues' formula."""
-    angle = math.hypot(*w)
-    if angle == 0.0:
-        return np.eye(3)
-    a, b, c = (value / angle for value in w)
-    K = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K)
-
-
-def _swing(before: np.ndarray, after: np.ndarray) -> list[float]:
-    """Return the rotation vector in the x–y plane that turns one unit vector (3,) into another, rad."""
-    dx, dy, _ = (after - before).tolist()
-    size = math.hypot(dx, dy)
-    if size < 1e-12:
-        return [0.0, 0.0, 0.0]
-    n = np.array(
-        [-dy / size, dx / size, 0.0]
-    )  # at right angles to the change, so both have the same part along it
-    across = before - (n @ before) * n
-    angle = math.atan2(float(n @ np.cross(across, after)), float(across @ after))
-    return [angle * float(n[0]), angle * float(n[1]), 0.0]

@@ -154,17 +154,11 @@ class Loop:
 
     def _prepare_turn(self, model: Model, limits: Limits) -> None:
         """Make what turns a tool with the hand, and what renders its torque, where the device has either."""
-        traits, upright = self.device.traits, self.workspace.upright
-        self.turn: HandTurn | None = None
-        self.turn_torque: TorqueOnHand | None = None
+        traits, space, axis = self.device.traits, self.workspace, getattr(model, "tool_axis", _UP)
         self._turn_sent, self._turn_seen = np.zeros(3), math.nan
-        axis = getattr(model, "tool_axis", _UP)
-        if traits.orients or traits.max_torque > 0.0:
-            self.turn = HandTurn(traits.axes, upright, model.parameters, axis)
-        if traits.max_torque > 0.0:
-            largest, scale = min(traits.max_torque, limits.max_torque), self.workspace.scale
-            controlled = traits.mass if self.controlled else 0.0
-            self.turn_torque = TorqueOnHand(largest, self.period, scale, controlled)
+        self.turn = HandTurn.on(traits, space.upright, model.parameters, axis)
+        mass, largest = traits.mass if self.controlled else 0.0, min(traits.max_torque, limits.max_torque)
+        self.turn_torque = TorqueOnHand.by(self.turn, largest, self.period, space.scale, mass)
 
     def take_delay(self, delay: float) -> None:
         """Draw the consequences of a delay, s: for the coupling's spring, the ledger and the added damping."""
@@ -417,7 +411,9 @@ class Loop:
 
     def control(self) -> None:
         """Count the energy, and damp what would give the hand more than it gave."""
-        controller, force, sent = self.passivity, self.out.force, self._sent
+        controller, force, sent, torque = self.passivity, self.out.force, self._sent, self.turn_torque
+        if torque is not None:
+            torque.count_way(sent, self.out.hand)
         if not self.open:
             self._stop_sending()
         else:
@@ -425,6 +421,7 @@ class Loop:
             free = not self.evaluator.force.any() and not sent.any()
             controller.max_force = self.safety.bearable_force
             elapsed, stored = self.now - self._before, self._stored() / self.workspace.scale
+            stored -= torque.work if torque is not None and torque.shares else 0.0
             clamped = self.safety.clamped
             controller.apply(self.out.hand, sent, elapsed, stored=stored, clamped=clamped, free=free)
             if controller.damping > 0.0:
@@ -453,7 +450,8 @@ class Loop:
             np.multiply(answer.torque, float(gate), out=self.out.torque)
             return
         elapsed, free = self.now - self._before, not answer.torque.any() and not torque.torque.any()
-        if not torque.send(answer.torque, turn.angle, elapsed, 0.0, gate=gate, free=free):
+        stored = self._stored() / self.workspace.scale
+        if not torque.send(answer.torque, turn.angle, elapsed, stored, gate=gate, free=free):
             self.fail(Fault.UNSTABLE)
             self._stop_swinging()
         self.out.torque[:] = torque.torque

@@ -19,8 +19,7 @@ _EVERY = 100  # ticks between two updates of the rate: 10 Hz is what an eye can 
 
 
 class Publisher:
-    """Fills and publishes state and indentations; the stages write to its views `hand`, `position`, `force` and
-    `torque` (3,).
+    """Fills and publishes state and indentations; stages write to its views `hand`, `position`, `force`, `torque` (3,).
 
     `record`, of dtype `STATE` and shape (), is the tick that is being filled. `offset`, s, is added to the time that is
     published: a replay that others look at has times of its own.

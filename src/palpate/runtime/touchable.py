@@ -123,6 +123,11 @@ class Touchable:
         return line_of(self.fields)
 
     @property
+    def tells_torque(self) -> bool:
+        """True where the torque on a tool is known: it was learnt, or turns of the tool are inputs."""
+        return torque_evaluator(self.energy, self.arm) is not None
+
+    @property
     def tool_axis(self) -> np.ndarray:
         """The tool's own axis (3,), a unit vector; z of a probe that has none."""
         turn = getattr(getattr(self.energy.baseline, "posed_tool", None), "turn", None)
@@ -289,7 +294,7 @@ class Touchable:
             radius=self.energy.baseline.radius,
             radius_input=self.radius_parameter,
             further=len(self.energy.parameters),
-            torque_at=torque_evaluator(self.energy, self.arm),
+            torque_at=torque_evaluator(self.energy, self.arm, few=few),
             few=few,
         )
 

@@ -136,7 +136,7 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
 
 def with_tool(study: Study, options: PartOptions) -> Study:
     """Return the study of a part under the tool of the options, in place of the ball that suits the part."""
-    from palpate.viewer.shown_part import require_room_for_tool
+    from palpate.viewer.shown_part import require_room_for_tool, require_round_edge
 
     body, ball = study.body, study.interaction
     assert isinstance(body, PartRecord)
@@ -151,7 +151,10 @@ def with_tool(study: Study, options: PartOptions) -> Study:
         )
     low, high = body.bare().skin.corners
     require_room_for_tool(tool, high - low)
+    require_round_edge(tool)
     content = under_tool(study.model_dump(), name, tool)
+    if options.element not in (None, AUTO):  # as somebody wants it
+        content["sweep"]["element"] = parse_quantity(options.element, "m", "--element", bare=False)
     if options.depth is None:
         deepest = tool_depth(tool.shape, ball.depth[1])
         content["interaction"]["depth"] = (_nice(LEAST_DEPTH * deepest), deepest)

@@ -8,11 +8,16 @@ from palpate.study.part_rim import RIM
 from palpate.study.tool_kind import tool_tables
 from palpate.tools import PosedTool, Tool
 
-__all__ = ["COARSE", "tool_depth", "under_ball", "under_tool"]
+__all__ = ["COARSE", "rough_element", "tool_depth", "under_ball", "under_tool"]
 
 COARSE = 0.5  # element over the radius: coarser ones do not feel the ball
 EDGE_ELEMENT = 2.0  # element over the least radius of curvature of a tool, at most
 DEEP = 0.75  # depth over a tool's size, at most, unless somebody chooses it
+
+
+def rough_element(shape: Tool) -> float:
+    """Return the size in m of the largest elements that see a tool and its edge."""
+    return float(min(shape.size, EDGE_ELEMENT * shape.least_radius))
 
 
 def tool_depth(shape: Tool, depth: float) -> float:

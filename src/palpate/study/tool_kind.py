@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
@@ -15,7 +16,21 @@ from palpate.study.stage_records import SECTIONS, PressSweepRecord, TouchTargetR
 from palpate.tools import Box, Capsule, Cone, Cylinder, Fingertip, PosedTool, Punch, Sphere, Tool
 from palpate.tools.tool_sizes import TURNS, USUAL, sizes_of
 
-__all__ = ["SHAPES", "ToolRecord", "ToolShape", "ToolSweepRecord", "tool_tables"]
+__all__ = [
+    "SHAPES",
+    "BoxShape",
+    "CapsuleShape",
+    "ConeShape",
+    "CylinderShape",
+    "FingertipShape",
+    "PunchShape",
+    "ShapeRecord",
+    "SphereShape",
+    "ToolRecord",
+    "ToolShape",
+    "ToolSweepRecord",
+    "tool_tables",
+]
 
 
 def _size(name: str, size: str, text: str) -> Any:
@@ -135,6 +150,13 @@ class ToolRecord(OnSurface):
         description="rotation vector by which it is turned about that point: its direction is the axis, its length the "
         'angle, such as ["0 deg", "5 deg", "0 deg"]',
     )
+    turns: Literal["fixed", "axis", "full"] = Field(
+        "fixed",
+        description="what of the orientation is an input: nothing, the tilt of its axis about x and y, or all of it",
+    )
+    tilt: Radians = Field(
+        math.radians(20), gt=0, lt=math.pi / 2, description="largest angle of an orientation that is an input"
+    )
     pad: PadStiffness | Literal["rigid"] = Field(
         1e7, description='stiffness of the pad; "rigid" for a tool without one that is felt'
     )
@@ -160,7 +182,7 @@ class ToolRecord(OnSurface):
 
     def build_tool(self) -> PosedTool:
         """Return the tool in its orientation."""
-        return PosedTool(self.shape.build(), self.rotation)
+        return PosedTool(self.shape.build(), self.rotation, self.turns, self.tilt)
 
     def build(self, body: Any, *, whole: bool = True, element: float | None = None) -> SurfaceTool:
         """Return the tool, over all of its places, with elements of a size in m beneath it."""
@@ -171,6 +193,8 @@ class ToolRecord(OnSurface):
             depth=self.depth,
             over=self.over,
             rotation=self.rotation,
+            turns=self.turns,
+            tilt=self.tilt,
             element=element,
         )
 

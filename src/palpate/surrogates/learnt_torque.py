@@ -17,9 +17,12 @@ from typing import Any
 
 import numpy as np
 
+from palpate.kernels import for_rows, kernel
+from palpate.network.network_kernels import point_into
 from palpate.surrogates.arguments import rows_of
 from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.learnt_quantities import LearntQuantities
+from palpate.tools.rotations import left_jacobian, rotation_matrix
 from palpate.units import Range, bounds
 
 __all__ = [
@@ -27,7 +30,6 @@ __all__ = [
     "TURNS",
     "TorqueEvaluator",
     "TurnEvaluator",
-    "left_jacobian",
     "torque_evaluator",
     "torque_of_slopes",
     "torques",
@@ -47,19 +49,6 @@ def turn_inputs(inputs: Sequence[Range]) -> tuple[int, ...]:
     return tuple(names.index(name) for name in TURNS if name in names)
 
 
-def left_jacobian(w: np.ndarray) -> np.ndarray:
-    """Return J (3, 3) of a rotation vector w (3,) in rad: exp(w + δw) = exp(J δw) exp(w)."""
-    angle = float(np.linalg.norm(w))
-    a, b, c = w.tolist()
-    K = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-    if angle < 1e-4:  # the next terms are of the fourth order
-        first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
-    else:
-        first = (1.0 - math.cos(angle)) / angle**2
-        second = (angle - math.sin(angle)) / angle**3
-    return np.asarray(np.eye(3) + first * K + second * K @ K)
-
-
 def torques(energy: LearntEnergy, evaluator: Any, X: np.ndarray) -> np.ndarray:
     """Return τ (N, 3) in N m by an evaluator, at inputs X (N, n) of a tool."""
     rows, found = rows_of(X, energy.inputs, "learnt body"), np.zeros((len(X), 3))
@@ -70,32 +59,45 @@ def torques(energy: LearntEnergy, evaluator: Any, X: np.ndarray) -> np.ndarray:
 
 
 class TorqueEvaluator:
-    """Torque by a learnt arm, one place at a time and without allocation: `torque` (3,), N m, is renewed by a call."""
+    """Torque by a learnt arm, one place at a time and without allocation: `torque` (3,), N m, is renewed by a call.
 
-    def __init__(self, arm: LearntQuantities) -> None:
+    One for a `few` places interprets the kernel.
+    """
+
+    def __init__(self, arm: LearntQuantities, *, few: bool = False) -> None:
         self.torque = np.zeros(3)
-        self._low, self._high = bounds(arm.inputs)
-        self._x = np.zeros(len(arm.inputs))
-        self._arm = arm.network.evaluator()
+        self._ends, self._x = np.array(bounds(arm.inputs)), np.zeros(len(arm.inputs))
+        self._network = arm.network.compiled()
+        self._kernel = for_rows(torque_into, 1) if few else torque_into
+        self(self._x[:3].copy(), self._x[3:].copy(), np.ones(3))  # compile now, not in the loop
+        self.torque[:] = 0.0
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray, force: np.ndarray) -> None:
         """Renew the torque at a place (3,) in m and further inputs (p,), where the tool feels a force (3,) in N."""
-        x, y, z = force.tolist()
-        size = math.sqrt(x * x + y * y + z * z)
-        if size == 0.0:
-            self.torque[:] = 0.0
-            return
-        self._x[:3] = position
-        self._x[3:] = parameters
-        np.clip(self._x, self._low, self._high, out=self._x)
-        np.multiply(self._arm(self._x), size, out=self.torque)
+        self._kernel(position, parameters, force, self._ends, self._x, self.torque, *self._network)
+
+
+@kernel
+def torque_into(position, parameters, force, ends, x, torque, work, steps, layout, scales, units, rows, modes, constants):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201, E501
+    """Fill ‖F‖ a (3,) at a place (3,) and further inputs (p,), each within its `ends` (2, n); x (n,) is scratch."""
+    size = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+    if size == 0.0:
+        for i in range(3):
+            torque[i] = 0.0
+        return
+    for i in range(len(x)):
+        value = position[i] if i < 3 else parameters[i - 3]
+        x[i] = min(max(value, ends[0, i]), ends[1, i])
+    point_into(x, torque, work, steps, layout, scales, units, rows, modes, constants)
+    for i in range(3):
+        torque[i] *= size
 
 
 class TurnEvaluator:
     """Torque by the energy's slopes along the turns: `torque` (3,), N m, is renewed by a call.
 
-    The energy is asked by `energy`, a function of a place (3,) in m and further inputs (p,) that returns U in J; `turns`
-    are the numbers of the further inputs that turn the tool, `rotation` (3, 3) its fixed rotation.
+    The energy is asked by `energy`, a function of a place (3,) in m and further inputs (p,) that returns U in J;
+    `turns` are the numbers of the further inputs that turn the tool, `rotation` (3, 3) its fixed rotation.
     """
 
     def __init__(
@@ -135,23 +137,23 @@ def torque_of_slopes(slope: np.ndarray, w: np.ndarray, axes: Sequence[int], down
     J = left_jacobian(w)
     rows, known = J.T[list(axes)], slope[list(axes)]
     if len(axes) < 3:
-        # exp(w) = 1 + K J
-        a, b, c = w.tolist()
-        K = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-        rows, known = np.vstack([rows, down + K @ (J @ down)]), np.append(known, 0.0)
+        rows, known = np.vstack([rows, rotation_matrix(w) @ down]), np.append(known, 0.0)
     return np.asarray(np.linalg.solve(rows, known))
 
 
-def torque_evaluator(energy: LearntEnergy, arm: LearntQuantities | None) -> Any:
-    """Return the evaluator of an energy's torque: by a learnt arm, by turns among its inputs, or None of neither."""
+def torque_evaluator(energy: LearntEnergy, arm: LearntQuantities | None, *, few: bool = False) -> Any:
+    """Return the evaluator of an energy's torque: by a learnt arm, by turns among its inputs, or None of neither.
+
+    One for a `few` places waits for no compiler.
+    """
     if arm is not None:
-        return TorqueEvaluator(arm)
+        return TorqueEvaluator(arm, few=few)
     felt = len(energy.inputs) - len(energy.parameters)
     turns = turn_inputs(energy.inputs)
     tool = getattr(energy.baseline, "posed_tool", None)
     if len(turns) < 2 or tool is None:
         return None
-    own = energy.evaluator()
+    own = energy.evaluator(few=few)
 
     def ask(position: np.ndarray, parameters: np.ndarray) -> float:
         own(position, parameters)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from palpate.format import count, millimetres, share
 from palpate.input_words import input_in_words
 from palpate.surrogates.card_text import bullets, escape_markdown, html_page, html_record, rows
+from palpate.surrogates.motion import motion_sentence
 from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.units import Range
 
@@ -275,6 +276,12 @@ def _training_of(meta: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict
     }
 
 
+def _motion_of(body: Any, meta: Mapping[str, Any]) -> list[str]:
+    """Return how quickly a body may be pressed, where its solves say its natural frequency."""
+    motion = _record(_record(_record(meta.get("dataset")).get("provenance")).get("motion"))
+    return [motion_sentence(motion, body.energy.going.deepest)] if motion.get("frequency") else []
+
+
 def _limits_of(body: Any, meta: Mapping[str, Any]) -> list[str]:
     """Return sentences on where the answers of a body hold."""
     limits = [
@@ -293,13 +300,13 @@ def _limits_of(body: Any, meta: Mapping[str, Any]) -> list[str]:
         room = body.lumps.room
         ends = " to ".join(millimetres(*corner) for corner in (room.lower, room.upper))
         limits.append(
-            f"Lumps have soft edges and may have diameters of {2e3 * room.radius.low:.3g} to {2e3 * room.radius.high:.3g} "
-            f"mm, {room.ratio.low:.3g} to {room.ratio.high:.3g} times the modulus, centres within {ends}, and do not meet."
+            f"Lumps have soft edges, diameters of {2e3 * room.radius.low:.3g} to {2e3 * room.radius.high:.3g} mm, "
+            f"{room.ratio.low:.3g} to {room.ratio.high:.3g} times the modulus, centres within {ends}, and do not meet."
         )
     known = "say" if body.energy.root is not None else "do not say"
     limits.append(f"The answers {known} how far the force may be off from place to place.")
     remembers = "Elastic: a force depends on the place alone, not on what came before."
-    limits.append(QUASI_STATIC)
+    limits += [QUASI_STATIC, *_motion_of(body, meta)]
     limits.append(remembers if body.memory is None else f"It remembers: {body.memory}.")
     runtime = _record(meta.get("runtime"))
     if runtime.get("max_force"):

@@ -1,4 +1,4 @@
-"""Learnt bodies that come with palpate, to be examined for lumps without a solve; `benchmarks/shipped_bodies.py` makes them."""
+"""Learnt bodies that come with palpate, to be examined for lumps; `benchmarks/shipped_bodies.py` makes them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from palpate.surrogates.surrogate import KIND, Surrogate
 __all__ = ["SHIPPED", "shipped_body"]
 
 SHIPPED = {
-    "breast": "a dome of soft tissue, ⌀120 mm and 45 mm high, on its base",
-    "prostate": "an ellipsoid cut level, 50 by 40 mm, under the finger",
-    "skin": "a block of skin, fat and muscle, 80 by 80 by 40 mm",
+    "breast": "a dome of glandular tissue, ⌀100 mm and 40 mm high, on its base",
+    "prostate": "a block of prostatic tissue, 50 by 40 by 30 mm",
+    "skin": "3 mm of skin, 12 mm of fat and 15 mm of muscle, 60 by 60 mm",
 }
 """Names of the bodies, and what each is."""
 

@@ -196,6 +196,7 @@ def provenance(problem: Problem, points: np.ndarray, design: str, seed: int) -> 
         "problem": problem.describe(),
         "words": getattr(problem, "words", ""),
         "symmetry": getattr(problem, "symmetry", None),
+        **({} if (motion := getattr(problem, "motion", None)) is None else {"motion": motion}),
         "design": design,
         "seed": seed,
         "samples": len(points),

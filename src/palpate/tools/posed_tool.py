@@ -15,6 +15,7 @@ from palpate.errors import UsageError
 from palpate.tools.edged_tools import Box, Cylinder, Punch
 from palpate.tools.rotations import rotation_matrix
 from palpate.tools.round_tools import Capsule, Cone, Fingertip, Sphere
+from palpate.tools.scanned_tool import ScannedTool
 from palpate.tools.tool_shape import Tool
 from palpate.units import Range
 
@@ -31,7 +32,7 @@ ANGLES: dict[str, tuple[str, ...]] = {
 MOST_TILT = math.pi / 2  # rad; a tool that lies over farther does not press with its tip
 
 SHAPES: dict[str, type[Tool]] = {
-    shape.__name__: shape for shape in (Box, Capsule, Cone, Cylinder, Fingertip, Punch, Sphere)
+    shape.__name__: shape for shape in (Box, Capsule, Cone, Cylinder, Fingertip, Punch, ScannedTool, Sphere)
 }
 
 
@@ -132,7 +133,7 @@ class PosedTool:
         return place, self.rotations(np.asarray(x, dtype=float)[..., 3:])
 
     def rotations(self, angles: np.ndarray) -> np.ndarray:
-        """Return the rotations (..., 3, 3) from the tool's frame to the body's at angles (..., k) in rad, none for all 0."""
+        """Return the rotations (..., 3, 3) from the tool's frame to the body's at angles (..., k) in rad."""
         w = np.zeros((*angles.shape[:-1], 3))
         count = min(len(ANGLES[self.turns]), angles.shape[-1])
         w[..., :count] = angles[..., :count]
@@ -167,6 +168,8 @@ class PosedTool:
         own shape that leaves its foremost point.
         """
         own = matrix if self.turn is None else self.turn.T @ matrix @ self.turn
+        if self.turns == "axis" and not np.isclose(abs(matrix[2, 2]), 1.0):
+            return False  # the image would turn about z
         return bool(np.isclose(own[2, 2], 1.0)) and self.shape.keeps(own)
 
     def reach(self, normals: np.ndarray, angles: np.ndarray | None = None) -> np.ndarray:

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-__all__ = ["left_jacobian", "rotation_matrix"]
+__all__ = ["left_jacobian", "rotation_matrix", "rotation_vector", "swing_vector"]
 
 SERIES = 1e-2  # rad; below it (θ − sin θ)/θ³ is taken from its series, which is exact there to rounding
 
@@ -34,6 +34,29 @@ def left_jacobian(w: np.ndarray) -> np.ndarray:
     safe = np.maximum(angle, SERIES)
     third = np.where(angle < SERIES, series, (safe - np.sin(safe)) / safe**3)
     return np.asarray(np.eye(3) + second * K + third * K @ K)
+
+
+def rotation_vector(R: np.ndarray) -> list[float]:
+    """Return the rotation vector of a rotation (3, 3), rad, of an angle below π."""
+    x, y, z = float(R[2, 1] - R[1, 2]), float(R[0, 2] - R[2, 0]), float(R[1, 0] - R[0, 1])
+    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
+    cosine = 0.5 * (float(R[0, 0] + R[1, 1] + R[2, 2]) - 1.0)
+    factor = 0.5 if sine < 1e-8 else 0.5 * math.atan2(sine, cosine) / sine
+    return [factor * x, factor * y, factor * z]
+
+
+def swing_vector(before: np.ndarray, after: np.ndarray) -> list[float]:
+    """Return the rotation vector in the x–y plane that turns one unit vector (3,) into another, rad."""
+    dx, dy, _ = (after - before).tolist()
+    size = math.hypot(dx, dy)
+    if size < 1e-12:
+        return [0.0, 0.0, 0.0]
+    n = np.array(
+        [-dy / size, dx / size, 0.0]
+    )  # at right angles to the change, so both have the same part along it
+    across = before - (n @ before) * n
+    angle = math.atan2(float(n @ np.cross(across, after)), float(across @ after))
+    return [angle * float(n[0]), angle * float(n[1]), 0.0]
 
 
 def _cross_matrix(w: np.ndarray) -> np.ndarray:

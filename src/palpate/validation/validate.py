@@ -56,8 +56,8 @@ class Validation:
         What was not judged, and why.
     figures : mapping of name to Figure
         ``force``, ``energy``, ``torque``, ``stiffness``, ``smoothness``, ``coverage``, ``contrast``, ``loops``,
-        ``border_loops``, ``shape``,
-        ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``, ``answers``: see `palpate.validation.figures`.
+        ``border_loops``, ``shape``, ``mesh``, ``networks``, ``histories``, ``parts``, ``worst``, ``answers``: see
+        `palpate.validation.figures`.
     """
 
     name: str

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from palpate.tools import PosedTool
 from palpate.tools.tool_mesh import tool_mesh
 from palpate.units import Range
@@ -12,8 +14,13 @@ __all__ = ["drawn_tool"]
 DIGITS = 7  # decimals of lengths in m: a tenth of a micrometre
 
 
-def drawn_tool(tool: PosedTool, parameters: tuple[Range, ...] = ()) -> DrawnTool:
-    """Return a tool as the page draws it; `parameters` are the inputs that a hand does not supply."""
+def drawn_tool(
+    tool: PosedTool, parameters: tuple[Range, ...] = (), shift: Sequence[float] = (0.0, 0.0, 0.0)
+) -> DrawnTool:
+    """Return a tool as the page draws it; `parameters` are the inputs that a hand does not supply.
+
+    `shift` (3,) is the way in m from its place to the ball whose depth counts.
+    """
     mesh, turn = tool_mesh(tool.shape), tool.turn
     points, normals = (
         (mesh.points, mesh.normals) if turn is None else (mesh.points @ turn.T, mesh.normals @ turn.T)
@@ -24,6 +31,7 @@ def drawn_tool(tool: PosedTool, parameters: tuple[Range, ...] = ()) -> DrawnTool
     return DrawnTool(
         words=str(tool),
         centre=(x, y, z),
+        shift=(float(shift[0]), float(shift[1]), float(shift[2])),
         points=tuple((points + tool.to_centre).round(DIGITS).ravel().tolist()),
         normals=tuple(normals.round(4).ravel().tolist()),
         triangles=tuple(mesh.triangles.ravel().tolist()),

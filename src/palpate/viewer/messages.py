@@ -107,6 +107,7 @@ class Frame(Binary):
         ),
     ]
     force: Annotated[Vec3, Wire("vec3", "N, on the hand")]
+    torque: Annotated[Vec3, Wire("vec3", "N m, on a tool about its place; zero where none is told")]
     rate: Annotated[float, Wire("f32", "Hz, ticks per second achieved")]
     lateness: Annotated[
         float, Wire("f32", "s, the latest tick since the frame before, to a quarter of itself")
@@ -282,6 +283,8 @@ class DrawnTool:
 
     words: str  # shape and sizes, such as ``capsule of radius 6 mm, 24 mm long``
     centre: Vec3  # (3,) way from the tool's place to its middle, m
+    # (3,) way from the tool's place to the ball whose depth counts, m: a file's core answers with contact points less it
+    shift: Vec3
     points: tuple[float, ...]  # x y z of each point from the place, m
     normals: tuple[float, ...]  # outward unit normal of each
     triangles: tuple[int, ...]  # three points each
@@ -303,6 +306,7 @@ class Hello(Json):
     radius: float  # of the probe, or of what is held, for drawing, m
     radius_parameter: int  # the parameter that is the probe's radius; -1 where none is
     tool: DrawnTool | None  # what presses where it is no ball; the probe's centre is then the tool's place
+    twists: bool  # whether the torque on the tool is told
     deepest: float  # deepest trained depth, or largest trained displacement of what is held, m
     force_max: float  # largest force of the trained region, N
     stiffness_max: float  # largest stiffness of the trained region, N/m

@@ -226,7 +226,7 @@ class Answer(Json):
 
     problem: str  # of the whole; empty where there is none
     # problems of single choices, by the names of `StartWish`; of sizes by ``size-`` and theirs, of regions by
-    # ``region-`` and their numbers; null: none of them was judged
+    # ``region-`` and their numbers; null: none was judged
     fields: Mapping[str, str] | None = None
     trial: bool = False  # whether the wish was one on trial
     tool: DrawnTool | None = None  # the tool that was wished for, to be drawn

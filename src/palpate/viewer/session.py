@@ -220,6 +220,7 @@ class Session:
             "echo": page.echo,
             "position": vector(state.position),
             "force": vector(state.force if loop is Loop.RUNNING else np.zeros(3)),
+            "torque": vector(state.torque if loop is Loop.RUNNING else np.zeros(3)),
             "rate": state.rate,
             "lateness": _latest(state, page),
             "lateness_p50": state.lateness_p50,

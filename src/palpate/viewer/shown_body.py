@@ -150,6 +150,7 @@ def _body_of_solutions(solutions: list[Any], name: str) -> ShownBody:
         steps=[_step_of(solution) for solution in good],
         units={VON_MISES: "Pa"},
         fixed=np.isin(mesh.surface_of, numbers),
+        tool=getattr(good[0], "tool", None),
     )
 
 
@@ -158,7 +159,8 @@ def _step_of(solution: Any) -> ShownStep:
 
     fields = {VON_MISES: "von_mises", STRETCH: "largest_stretch"}
     known = {name: getattr(solution, attribute, None) for name, attribute in fields.items()}
-    ball = ball_of(solution, True)
+    tool, pose = getattr(solution, "tool", None), getattr(solution, "pose", None)
+    ball = ball_of(solution, True) if tool is None or pose is None else (pose[:3], tool.shape.size)
     return ShownStep(
         displacement=solution.displacement,
         values={name: values for name, values in known.items() if values is not None},

@@ -50,6 +50,7 @@ __all__ = [
     "error_line",
     "require_room",
     "require_room_for_tool",
+    "require_round_edge",
     "wished_tool",
 ]
 
@@ -232,7 +233,7 @@ def wished_tool(wish: StartWish) -> PosedTool:
 
 
 def _size_problems(wish: StartWish, room: np.ndarray) -> dict[str, str]:
-    """Return what is wrong with the sizes of a tool on a part of a size (3,) in m, in sentences by ``size-`` and their names."""
+    """Return what is wrong with the sizes of a tool on a part of a size (3,) in m, by ``size-`` and their names."""
     problems: dict[str, str] = {}
     for key, text in wish.sizes.items():
         try:

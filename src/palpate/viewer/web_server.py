@@ -106,7 +106,7 @@ BACKLOG = 32  # connections that are taken at once, between two looks at what pa
 
 
 def skeleton(mode: str) -> str:
-    """Return the document of all pages for one of them: touch, shown or part."""
+    """Return the document of all pages for one of them: touch, shown, part, answers or exam."""
     return (STATIC / "index.html").read_text("utf-8").replace('data-mode="touch"', f'data-mode="{mode}"')
 
 

@@ -222,7 +222,11 @@ PP_PART int pp_open(const unsigned char *bytes, uint64_t size, pp_array *arrays)
   if (n < 1 || n > PP_MOST || k < 1 || k > 3 || k > n || head[PP_RADIUS_INPUT] >= n) return PP_MISFIT;
   if (!pp_is(&arrays[PP_NUMBERS], 5, 1, 1) || !pp_is(&arrays[PP_LIMITS], 3, n, 1)) return PP_MISFIT;
   if (!pp_is(&arrays[PP_AXES], k, 3, 1) || !pp_net_fits(arrays + PP_NET, n, k, 1)) return PP_MISFIT;
-  if (arrays[PP_ARM].n[0] > 0 && (k != 3 || !pp_net_fits(arrays + PP_ARM, n, 0, 3))) return PP_MISFIT;
+  if (pp_tells_torque(arrays)) {
+    pp_array net[PP_NET_ARRAYS];
+    pp_arm(arrays, net);
+    if (k != 3 || !pp_net_fits(net, n, 0, 3)) return PP_MISFIT;
+  }
   if (arrays[PP_POINTS].n[0] > 0 && (!pp_is(&arrays[PP_POINTS], n, arrays[PP_POINTS].n[1], 1) ||
                                      arrays[PP_POINTS].n[1] % PP_LANES)) return PP_MISFIT;
   if (!pp_baseline_fits(arrays, head) || !pp_memory_fits(arrays, head)) return PP_MISFIT;

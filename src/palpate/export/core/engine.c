@@ -89,6 +89,11 @@ PALPATE_API int32_t palpate_step(palpate_body *body, double dt, const double *x,
   return flags | PP_NOT_A_NUMBER; /* and the force is zero */
 }
 
+/* Fill the torque (3) on a tool about its place, N m, at x and p, of a force (3) that it feels there; zero of all others. */
+PALPATE_API void palpate_torque(const palpate_body *body, const double *x, const double *p, const double *force, double *torque) {
+  pp_torque(&body->model, x, p, force, torque);
+}
+
 /* Let go of the body for dt seconds: x (3), where the hand held it, becomes the place where it lies then; the flags. */
 PALPATE_API int32_t palpate_release(palpate_body *body, double dt, double *x, const double *p) {
   const pp_real *axis = body->arrays[PP_AXES].real; /* the one direction that is felt */

@@ -224,7 +224,11 @@ static int value_of(Instance *c, uint32_t v, double *value) {
     renew(c);
     if (v <= FZ) *value = c->now.scale * c->now.force[v - FX] + c->drag[v - FX];
     else if (v == ENERGY) *value = c->now.scale * c->answer[PP_ENERGY];
-    else if (v == DEPTH) *value = c->answer[PP_DEPTH];
+    else if (v >= TORQUE && v < TORQUE + 3 && pp_tells_torque(c->arrays)) {
+      double torque[3];
+      pp_torque(&c->model, c->now.x, c->now.p, c->now.force, torque);
+      *value = c->now.scale * torque[v - TORQUE];
+    } else if (v == DEPTH) *value = c->answer[PP_DEPTH];
     else if (v == DEVIATION) {
       if (!c->deviated) c->deviation = pp_deviation(&c->model, c->now.x, c->now.p, c->answer, c->work);
       c->deviated = 1;

@@ -31,7 +31,7 @@ enum { INSTANTIATED = 1, INITIALIZING = 2, EVENT = 4, CONTINUOUS = 8, STEPPING =
  * rates after those; what no hand feels has its inputs from PARAMETER on and its answers from ANSWER on */
 enum {
   FX = 3, FY = 4, FZ = 5, ENERGY = 6, DEPTH = 7, DEVIATION = 8, SCALE = 9, STORED = 10, LOST = 11, TIME = 15, PARAMETER = 16,
-  DAMPING = 48, MASS = 49, PUSH = 50, SPEED = 53, KINETIC = 56, STATE = 64, ANSWER = 1024,
+  DAMPING = 48, MASS = 49, PUSH = 50, SPEED = 53, KINETIC = 56, TORQUE = 57, STATE = 64, ANSWER = 1024,
   ANSWER_DEVIATION = 1 << 25
 };
 

@@ -48,7 +48,7 @@ enum {
   PP_FIELD = 36,    /* the field: see field.c */
   PP_FIELD_NET = 44,
   PP_FIELD_SURFACE = 49, /* frame, coefficients, profile of the surface that a field is of */
-  PP_ARM = 53, /* torque per newton on a tool: PP_NET_ARRAYS arrays of a network of three outputs */
+  PP_ARM = 56, /* torque per newton on a tool: a network of three outputs on the scales of l, see torque.c */
   PP_ARRAYS = 64
 };
 

@@ -12,7 +12,7 @@ static const pp_model wasm_model = {wasm_arrays};
 static pp_array wasm_further[WASM_FIELDS][PP_ARRAYS]; /* of further fields of the same body */
 static int32_t wasm_fields;                           /* how many these are */
 static pp_array wasm_network[PP_ARRAYS];              /* a network of its own, such as that of a bent line */
-static pp_real wasm_asked[3 + PP_MOST], wasm_answer[PP_ANSWER + 1];
+static pp_real wasm_asked[3 + PP_MOST], wasm_answer[PP_ANSWER + 1], wasm_torque[3];
 static pp_real *wasm_work; /* behind the block: for the deviation, the state of the memory, the shape of a touch */
 static pp_real *wasm_state, *wasm_shape;
 extern uint8_t __heap_base;
@@ -137,6 +137,12 @@ PP_EXPORT("release") int32_t wasm_release(pp_real dt) {
   }
   for (i = 0; i < 3; i++) wasm_answer[PP_FORCE + i] = R(0);
   return flags;
+}
+
+/* Torque (3) on the tool about its place, at what was asked, of the force in the answer; its place in bytes. */
+PP_EXPORT("torque") uint32_t wasm_torque_at(void) {
+  pp_torque(&wasm_model, wasm_asked, wasm_asked + 3, wasm_answer + PP_FORCE, wasm_torque);
+  return (uint32_t)(uintptr_t)wasm_torque;
 }
 
 /* Go back to a body that nothing was done to. */

@@ -18,7 +18,8 @@ def images_of(solves: Solves, baseline: Baseline) -> Images | None:
 
     A probe's centre c becomes p₀ + M(c − p₀), p₀ the point that stays; a displacement d becomes M d, and the place of
     what is held, whose coordinates are along `solves.axes`, p₀ + M(p − p₀). Felt coordinates are turned within the
-    baseline's directions. By default p₀ is the middle of the place's ranges. Further inputs stay what they are.
+    baseline's directions. By default p₀ is the middle of the place's ranges. A rotation vector w becomes det M M w: in
+    a mirror a turn goes the other way. Further inputs stay what they are.
     """
     if not len(solves.symmetry):
         return None
@@ -45,6 +46,9 @@ def images_of(solves: Solves, baseline: Baseline) -> Images | None:
         turns[:, where, where] = own * half[where] / half[where, None]
         moved = (middle[where] - fixed) @ own.transpose(0, 2, 1) + fixed - middle[where]
         shifts[:, where] = moved / half[where]
+    some = slice(k, k + solves.angles)
+    own = np.linalg.det(M)[:, None, None] * M[:, : solves.angles, : solves.angles]
+    turns[:, some, some] = own * half[some] / half[some, None]
     return Images(turns, shifts)
 
 

@@ -1,7 +1,7 @@
 """Functions of several inputs as sums of Gaussians of one shape with an affine tail, fitted to values and slopes.
 
 With the centres and the widths along the inputs given, this is linear least squares with a ridge. The widths are found
-by coordinate search: each is made wider and narrower in turn, and kept where rows of groups left out are missed by less.
+by coordinate search: each is made wider and narrower in turn, and kept where rows of left-out groups are missed less.
 """
 
 from __future__ import annotations

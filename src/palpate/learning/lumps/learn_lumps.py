@@ -1,9 +1,9 @@
 """The energy that a lump adds to a press, learnt from lookups in presses without a lump.
 
-Rows are the lumps that were looked up in each press of a `LumpProblem` (`palpate.surrogates.lumps.lump_contrast` has the
-formulas). Of ln(D/U) values and slopes by the place of the hand are fitted, of ln β values. The constant k of the closed
-form, and its error, come from the presses that were solved with a lump. The error is that of presses whose places were
-left out: the change of force over the solved change, where that is above 1 % of the force.
+Rows are the lumps looked up in each press of a `LumpProblem`; `palpate.surrogates.lumps.lump_contrast` has formulas.
+Of ln(D/U) values and slopes by the place of the hand are fitted, of ln β values. The constant k of the closed form, and
+its error, come from the presses that were solved with a lump. The error is that of presses whose places were left out:
+‖learnt − solved change of force‖ over the solved change, where that is above 1 % of the force.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from palpate.errors import UsageError
 from palpate.learning.dataset_symmetry import declared_symmetry
 from palpate.learning.lumps.gaussian_surfaces import Samples, as_network, fit_surface, fit_widths
 from palpate.network.network import Scaling
-from palpate.surrogates.lumps.lump_contrast import LumpContrast, LumpRoom, closed_form, contrast_inputs
+from palpate.surrogates.lumps.lump_contrast import LumpContrast, closed_form, contrast_inputs
+from palpate.surrogates.lumps.lump_room import LumpRoom, skin_of
 from palpate.units import Quantity, Range
 
 __all__ = ["LEAST_CONTRAST", "LumpPresses", "learn_lumps"]
@@ -92,6 +93,7 @@ class LumpPresses:
             Range("radius", *record["radius"], "m"),
             Range("ratio", *record["ratio"]),
             record["cover"],
+            skin_of(data.rest, data.triangles),
         )
         names = ("place", "radius", "energy", "slope", "compliance", "ratio", "added", "force")
         lumps = [np.asarray(data[f"lump_{name}"]) for name in names]
@@ -196,12 +198,12 @@ class _Shape:
     def density_rows(self, presses: LumpPresses) -> tuple[Samples, np.ndarray]:
         """Return rows of ln(D/U) less its closed form, and their groups."""
         Z, images, index = _rows(presses)
-        i, l = index.T
-        D, U = presses.density[i, l], presses.energy[i]
+        i, j = index.T
+        D, U = presses.density[i, j], presses.energy[i]
         offset = Z[:, 3:6]
         squared = (offset**2).sum(axis=1)
         value = np.log(D / U) - 3.0 * Z[:, 6] + 0.5 * self.decay * np.log(squared)
-        slope = presses.slope[i, l] / D[:, None] + presses.force[i] / U[:, None]
+        slope = presses.slope[i, j] / D[:, None] + presses.force[i] / U[:, None]
         slope = np.einsum("nij,nj->ni", images, slope) - self.decay * offset / squared[:, None]
         share = D / U
         weight = (share / (share + FELT)) ** 2
@@ -220,10 +222,10 @@ class _Shape:
         """Return rows of ln β, and their groups."""
         Z, _, index = _rows(presses)
         few = index[:, 1] < presses.compliance.shape[1]
-        i, l = index[few].T
-        share = presses.density[i, l] / presses.energy[i]
+        i, j = index[few].T
+        share = presses.density[i, j] / presses.energy[i]
         rows = Samples(
-            self.scaling.scale_inputs(Z[few]), np.log(presses.compliance[i, l]), (share / (share + FELT)) ** 2
+            self.scaling.scale_inputs(Z[few]), np.log(presses.compliance[i, j]), (share / (share + FELT)) ** 2
         )
         return rows, presses.groups[i]
 
@@ -239,7 +241,7 @@ class _Shape:
 
 
 def _rows(presses: LumpPresses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return inputs (R, 7) of all lookups and of some images of them, the isometries (R, 3, 3), and (R, 2) of press, lump."""
+    """Return inputs (R, 7) of all lookups and some images, the isometries (R, 3, 3), and (R, 2) of press and lump."""
     N, L = presses.radius.shape
     group, about = presses.symmetry, presses.about
     count = min(len(group), IMAGES)

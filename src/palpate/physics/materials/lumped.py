@@ -1,7 +1,8 @@
 """A law with a lump: the energy density of another law times a factor that is another one in a ball.
 
-The factor and its soft edge are those of `palpate.surrogates.lumps.lump`. So a body with a lump has the mesh of the body
-without: what the lump changes is no difference of two meshes. In mixed form distortion and bulk modulus have the factor.
+The factor and its soft edge are those of `palpate.surrogates.lumps.lump`. So a body with a lump has the mesh of the
+body without: what the lump changes is no difference of two meshes. In mixed form distortion and bulk modulus have the
+factor.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ NEAREST = 1e-8  # m: keeps the root of a squared distance differentiable at the 
 
 @dataclass(frozen=True)
 class LumpField:
-    """The factor of a lump as a coefficient function of NGSolve: numbers, or parameters that change without compiling."""
+    """The factor of a lump as a coefficient function of NGSolve, of numbers or of parameters that are set later."""
 
     x: Any
     y: Any

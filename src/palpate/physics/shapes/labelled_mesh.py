@@ -310,6 +310,7 @@ def _told(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, s
         if thick < spacing or abs(there - wanted) > TELLS * wanted:
             told.append(
                 f"{name} is about {millimetres(thick)} thick, and elements {millimetres(spacing)}: {said}, but layers "
-                f"thinner than an element come out ragged. Elements of {millimetres(0.7 * thick)} keep them, and take longer."
+                f"thinner than an element come out ragged. Elements of {millimetres(0.7 * thick)} keep them, and take "
+                "longer."
             )
     return told

@@ -19,13 +19,14 @@ from palpate.physics.shapes.meshing import FineMesh
 __all__ = ["FINER", "finer_problem"]
 
 FINER = 0.5  # size of the elements over the ordinary one
-REACH = 1.3  # half the side of the box of small elements around the place, over the ball's radius or the tool's reach
+# half the side of the box of small elements around the place, over the ball's radius or the tool's reach
+REACH = 1.3
 # the same: sides of a box that are so near to another edge coincide with it, or slivers would lie between
 NEAR = 0.25
 
 
 def finer_problem(problem: Any, places: np.ndarray) -> Any:
-    """Return a problem of a body, or of a family, whose mesh is twice as fine around the ball or tool at places (N, n ≥ 3).
+    """Return a problem of a body, or of a family, whose mesh is twice as fine around what presses at places (N, n ≥ 3).
 
     Elsewhere the mesh is as fine as that of `problem`, on which one ball or tool acts.
     """

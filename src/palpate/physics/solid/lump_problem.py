@@ -21,6 +21,7 @@ from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.shapes.meshing import INSIDE, FineMesh
 from palpate.physics.solid.lump_solver import LumpSolver
 from palpate.surrogates.lumps import LumpRoom
+from palpate.surrogates.lumps.lump_room import skin_of
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -95,16 +96,21 @@ class LumpProblem:
         checks.fits("The share of presses with a lump", self.solved, least=0.0, most=1.0)
         if self.element is not None:
             checks.positive("The element size where lumps may be", self.element, "m")
-        _ = self.lump_room
+        _ = self._box
         fine = (*self.base.refinements, self._inside)
         if self._inside not in self.base.refinements:
             object.__setattr__(self, "base", replace(self.base, fine=fine))
 
     @property
-    def lump_room(self) -> LumpRoom:
-        """The room and the sizes as a learnt body keeps them."""
+    def _box(self) -> LumpRoom:
+        """The room without the body's skin."""
         radius, ratio = Range("radius", *self.radius, "m"), Range("ratio", *self.ratio)
         return LumpRoom(np.array(self.room[0]), np.array(self.room[1]), radius, ratio, self.cover)
+
+    @cached_property
+    def lump_room(self) -> LumpRoom:
+        """The room, the sizes and the skin as a learnt body keeps them."""
+        return replace(self._box, skin=skin_of(self.mesh.points, self.mesh.triangles))
 
     @property
     def _inside(self) -> FineMesh:

@@ -12,7 +12,6 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.physics.interactions.interaction import Energy
 from palpate.physics.materials.lumped import Lumped, LumpField
-from palpate.physics.shapes.meshing import split_triangles
 from palpate.physics.solid.solid_energy import deformation_gradient, volume_rule
 from palpate.physics.solid.solid_solution import SolidSolution
 from palpate.physics.solid.solid_solver import SolidSolver
@@ -25,9 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["LumpSolution", "LumpSolver"]
 
 NO_LUMP = (0.0, 0.0, 0.0, 1.0, 1.0)  # x, y, z, radius (m) and ratio
-NEAR = 0.025  # m beyond the ball's surface: half the lumps are looked up within that
-TRIES = 64  # candidates for each lump that is looked up
-BOUNDARY = 0.0015  # m: longest edge of the triangles whose middles stand for the body's surface
+NEAR = 0.014  # m beyond the ball: half the lumps are looked up within that, where they are felt
+TRIES = 16  # candidates for each lump that is looked up
 STEPS = (
     2e-4,
     2e-4,
@@ -110,7 +108,7 @@ class LumpSolver:
         self._solver = SolidSolver(replace(base, body=replace(body, material=self._materials)))
         self._model = self._solver.model
         self._tissue = _Tissue(self._model, self._materials, LumpField(*self._parameters))
-        self._surface = _surface_tree(problem)
+        self._room = problem.lump_room
 
     def reset(self) -> None:
         """Forget all earlier solves."""
@@ -177,7 +175,7 @@ class LumpSolver:
         A state that folds under the tool, or any other that is refused, comes back as its reason in words.
         """
         model, q = self._model, solution.inputs
-        self.require(lump)
+        self._room.require_cover(lump)
         system = model.system
         self._set(NO_LUMP)
         model.set(q)
@@ -199,22 +197,6 @@ class LumpSolver:
         """Factorise the tangent of the press that was solved last again, where a press with a lump has replaced it."""
         if not self._model.has_tangent:
             self._model.fresh_sensitivity(solution.state, solution.inputs)
-
-    def require(self, lump: Lump) -> None:
-        """Refuse a lump that leaves the body.
-
-        Raises
-        ------
-        UsageError
-            If its edge, and the tissue about it, reach beyond the body's surface.
-        """
-        clear, least = self._clear(np.array([lump.place]))[0], EDGE * lump.radius + self._problem.cover
-        if clear < least:
-            raise UsageError(
-                f"The {lump} leaves the body's skin.",
-                why=f"Its centre is {1e3 * clear:.3g} mm from the surface; it needs {1e3 * least:.3g} mm.",
-                fix="Move it deeper, or make it smaller.",
-            )
 
     def _set(self, numbers: Sequence[float]) -> None:
         for parameter, value in zip(self._parameters, numbers, strict=True):
@@ -240,7 +222,7 @@ class LumpSolver:
         lower, upper = map(np.array, problem.room)
         places = rng.uniform(lower, upper, (TRIES * count, 3))
         radii = rng.uniform(*problem.radius, len(places))
-        fits = self._clear(places) >= EDGE * radii + problem.cover
+        fits = self._room.hold(places, radii)
         places, radii = places[fits], radii[fits]
         if len(places) < count:
             raise UsageError(
@@ -255,13 +237,6 @@ class LumpSolver:
         rows = np.empty(count, dtype=int)
         rows[::2], rows[1::2] = order[: (count + 1) // 2], rest
         return places[rows], radii[rows]
-
-    def _clear(self, places: np.ndarray) -> np.ndarray:
-        """Return the distances (N,) in m of places inside the body from its surface; 0 for those outside."""
-        tree, normals = self._surface
-        distance, nearest = tree.query(places)
-        inward = ((places - tree.data[nearest]) * normals[nearest]).sum(axis=1) < 0
-        return np.where(inward, distance, 0.0)
 
 
 class _Tissue:
@@ -291,7 +266,7 @@ class _Tissue:
         self._linear, self._edge = (System(self._field, terms, free, "") for terms in (linear, edge))
 
     def moments(self, z: np.ndarray) -> tuple[float, float, np.ndarray]:
-        """Return ∫ χ W dV and −½ ∂²Π/∂ratio² at rest in J, of the lump that is set, and the slope (dof,) of the first."""
+        """Return ∫ χ W dV and −½ ∂²Π/∂ratio² in J of the lump that is set, and the slope (dof,) of the first."""
         return self._linear.potential(z), self._edge.potential(z), self._linear.gradient(z)
 
     def energies(
@@ -343,15 +318,6 @@ class _Points:
                 rates[:, i] += push * np.asarray(self._pressure(self._mapped)).ravel()
         space.show(z)
         return work, rates * self._weights[:, None]
-
-
-def _surface_tree(problem: LumpProblem) -> tuple[Any, np.ndarray]:
-    """Return a tree of points of the body's surface, close together, and the outward normals (N, 3) there."""
-    from scipy.spatial import cKDTree
-
-    mesh = problem.mesh
-    corners, origin = split_triangles(mesh.points[mesh.triangles], BOUNDARY)
-    return cKDTree(corners.mean(axis=1)), mesh.normals[origin]
 
 
 def _generator(q: np.ndarray) -> np.random.Generator:

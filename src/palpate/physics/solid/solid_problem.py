@@ -5,14 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from palpate import checks
 from palpate.dataset import Field, Layout, solid_fields
-from palpate.errors import UsageError
+from palpate.errors import SolverError, UsageError
 from palpate.physics.apart import is_foreign, solve_apart
 from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Interaction, Planned
@@ -24,6 +24,7 @@ from palpate.physics.interactions.surface_tool import SurfaceTool
 from palpate.physics.shapes.divided_surface import MOST_DRAWN, divide_large
 from palpate.physics.shapes.naming import require_known
 from palpate.physics.solid.body_symmetry import symmetry_of
+from palpate.physics.solid.natural_frequency import DENSITY, natural_frequency
 from palpate.physics.solid.solid_checks import (
     advise_on_sizes,
     longest_side,
@@ -33,6 +34,9 @@ from palpate.physics.solid.solid_checks import (
     require_near,
     require_no_loose_part,
 )
+from palpate.processes import CASE_LIMIT
+from palpate.supervised import run_in_child
+from palpate.tools import PosedTool
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -207,6 +211,23 @@ class SolidProblem:
             symmetry = symmetry.part(acting.posed_tool.keeps(matrix) for matrix in symmetry.matrices)
         return symmetry.describe()
 
+    @cached_property
+    def motion(self) -> dict[str, float] | None:
+        """Lowest natural frequency in Hz of the body alone, and the density in kg/m³ where one had to be assumed.
+
+        None where it could not be found: of a body that nothing holds, or whose mesh ends the child process.
+        """
+        coarse, foreign = replace(self, fine=()), is_foreign(self.body.geometry)
+        try:
+            apart = partial(run_in_child, natural_frequency, limit=CASE_LIMIT)
+            lowest = (apart if foreign else natural_frequency)(coarse)
+        except (SolverError, RuntimeError):  # what ARPACK and NGSolve raise, too
+            return None
+        if lowest is None:
+            return None
+        assumed = not all(material.density for material in self.body.materials.values())
+        return {"frequency": float(f"{lowest:.4g}"), **({"density": DENSITY} if assumed else {})}
+
     @property
     def words(self) -> str:
         """The body in a few words, for the title of its answers."""
@@ -316,6 +337,16 @@ class SolidProblem:
             if isinstance(interaction, SphereProbe):
                 return interaction, np.asarray(x[first : first + 3])
             first += len(interaction.ranges(self.body.geometry))
+        return None, None
+
+    def tool_at(self, x: np.ndarray) -> tuple[PosedTool | None, np.ndarray | None]:
+        """Return the first tool among the interactions, and its own inputs (3 + k,) among x (n,)."""
+        first = 0
+        for interaction in self.interactions:
+            count = len(interaction.ranges(self.body.geometry))
+            if isinstance(interaction, SurfaceTool):
+                return interaction.posed_tool, np.asarray(x[first : first + count])
+            first += count
         return None, None
 
     def __str__(self) -> str:

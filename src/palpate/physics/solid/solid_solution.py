@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from palpate.physics.interactions.sphere import SphereProbe
     from palpate.physics.solid.solid_field import MidSides
     from palpate.physics.solid.solid_path import LoadStep
+    from palpate.tools import PosedTool
 
 __all__ = ["SolidSolution"]
 
@@ -84,6 +85,10 @@ class SolidSolution:
         The sphere among the interactions, if there is one.
     centre : (3,) array or None
         Where its centre is, in m.
+    tool : PosedTool or None
+        The tool among the interactions, if there is one.
+    pose : (3 + k,) array or None
+        Its place in m, then its angles in rad where they are inputs.
     torque : (3,) array or None
         Torque on a `SurfaceTool` about its place, in N m; None without such a tool, and unless converged.
     mid_sides : MidSides or None
@@ -116,6 +121,8 @@ class SolidSolution:
     fixed: tuple[str, ...] = ()
     probe: SphereProbe | None = None
     centre: np.ndarray | None = None
+    tool: PosedTool | None = None
+    pose: np.ndarray | None = None
     torque: np.ndarray | None = None
     mid_sides: MidSides | None = None
 

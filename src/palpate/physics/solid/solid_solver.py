@@ -285,6 +285,7 @@ class _SolutionBuilder:
         """Return a solution under inputs q (n,), with what a picture shows beside the body."""
         problem = self._problem
         probe, centre = problem.probe_at(q)
+        tool, pose = problem.tool_at(q)
         return SolidSolution(
             mesh=self._mesh,
             ranges=problem.ranges,
@@ -292,6 +293,8 @@ class _SolutionBuilder:
             fixed=problem.body.fixed,
             probe=probe,
             centre=centre,
+            tool=tool,
+            pose=pose,
             **parts,
         )
 

@@ -61,6 +61,8 @@ class Solves:
         The point that they leave where it is, m.
     axes : tuple of int
         Along which axes the inputs after the felt ones are coordinates of a place that turns with the body.
+    angles : int
+        How many inputs after the felt ones are components x, y, z of a rotation vector, which turns with the body.
     options : mapping
         Further arguments of `palpate.learning.learn_energy` that the data decides.
     """
@@ -73,6 +75,7 @@ class Solves:
     symmetry: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     about: np.ndarray | None = None
     axes: tuple[int, ...] = ()
+    angles: int = 0
     options: Mapping[str, Any] = field(default_factory=dict)
 
 

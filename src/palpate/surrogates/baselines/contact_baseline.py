@@ -39,11 +39,11 @@ from palpate.surrogates.energy_kernels import (
 from palpate.surrogates.surface import TouchedSurface, distance_into
 from palpate.units import Range
 
-__all__ = ["ContactBaseline", "depth_series", "leave_contact"]
+__all__ = ["ContactBaseline", "depth_series", "fill_law", "leave_contact", "leave_saturated"]
 
 
 # step over the probe's radius, of the difference that finds the third derivative of the distance
-_STEP = 1e-3
+STEP = 1e-3
 _FINEST = 1.0 / 40.0  # shortest way over which touches change, over the probe's radius
 _SAME_PLACE = 0.02  # distance over the probe's radius within which two contact points are one
 _FACTORS = (1.0, 0.3, 3.0, 0.1, 10.0)  # candidates of the crossing length, over the guessed one
@@ -133,7 +133,7 @@ class ContactBaseline(Baseline):
         """Return the kernels and their arguments."""
         own = -1 if self.radius_at is None else self.radius_at - 3
         usual = self.probe_radius if math.isfinite(self.probe_radius) else self.touched.reach
-        numbers = np.array([*self.law.numbers(), self.probe_radius, own, _STEP * usual])
+        numbers = np.array([*self.law.numbers(), self.probe_radius, own, STEP * usual])
         return Compiled(None, (numbers, self.touched.compiled()), enter=_enter, leave=leave_contact)
 
     def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
@@ -242,10 +242,19 @@ def depth_series(X: np.ndarray, surface: TouchedSurface, radius: float) -> np.nd
 def _enter(position, parameters, moved, base, small, numbers, args) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill the law's energy and derivatives; move the place at which ℓ is asked to the saturated depth."""
     own, surface = args
-    d, D, b, B = small[VECTORS, OUTWARD], small[SURFACE], small[VECTORS, GRADIENT], small[HESSIAN]
     which = int(own[_RADIUS_INPUT])
     radius = own[_RADIUS] if which < 0 else parameters[which]
-    s = radius - distance_into(position, d, D, *surface)
+    s = radius - distance_into(position, small[VECTORS, OUTWARD], small[SURFACE], *surface)
+    return fill_law(s, moved, base, small, numbers, own)
+
+
+@part
+def fill_law(s, moved, base, small, numbers, own) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Fill the law's energy and derivatives at a depth s, −∇s and −∇²s of which are in `small`; whether it touches.
+
+    The place at which ℓ is asked moves to the saturated depth.
+    """
+    d, D, b, B = small[VECTORS, OUTWARD], small[SURFACE], small[VECTORS, GRADIENT], small[HESSIAN]
     base[1] = s
     if s <= 0.0:
         return False
@@ -281,20 +290,25 @@ def _bend_into(x, g, small, step, surface) -> None:  # type: ignore[no-untyped-d
 
 @part
 def leave_contact(position, base, small, numbers, args) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Take ∇ℓ and ∇²ℓ from the saturated depth to the place; see `leave_saturated`."""
+    own, surface = args
+    if base[1] > numbers[1]:
+        _bend_into(position, small[VECTORS, 1], small, own[_STEP_AT], surface)
+        leave_saturated(base, small, numbers)
+
+
+@part
+def leave_saturated(base, small, numbers) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Take ∇ℓ and ∇²ℓ by c̃ = c + m ∇d, m = s − σ(s), to those by c.
 
     J = I + m ∇²d − (1 − σ') ∇d ∇dᵀ takes g to J g and ∇²ℓ to J ∇²ℓ J, and with h = ∇²d g there remains
-    −(1 − σ')(∇d hᵀ + h ∇dᵀ + (∇d·g) ∇²d) − σ'' (∇d·g) ∇d ∇dᵀ + m ∂∇²d/∂g.
+    −(1 − σ')(∇d hᵀ + h ∇dᵀ + (∇d·g) ∇²d) − σ'' (∇d·g) ∇d ∇dᵀ + m ∂∇²d/∂g, whose last part is in small[BEND].
     """
-    own, surface = args
     s = base[1]
     depth, slope, curvature = saturated(s, numbers[1], numbers[2])
-    if s <= depth:
-        return
     excess = s - depth
     D, H, bend, J = small[SURFACE], small[LOG], small[BEND], small[OTHER]
     d, g, new, h = small[VECTORS, OUTWARD], small[VECTORS, 1], small[MORE, 0], small[MORE, 1]
-    _bend_into(position, g, small, own[_STEP_AT], surface)
     along, rest = d[0] * g[0] + d[1] * g[1] + d[2] * g[2], 1.0 - slope
     for i in range(3):
         h[i] = D[i, 0] * g[0] + D[i, 1] * g[1] + D[i, 2] * g[2]

@@ -4,10 +4,12 @@
 
     lump           one lump: place, radius and ratio of moduli
     lump_contrast  the learnt energy that any lump adds, by place of the hand and by lump
+    lump_room      where lumps may be, and how large
     lump_units     further units of a body's network that carry the lumps which were chosen
 """
 
 from palpate.surrogates.lumps.lump import Lump
-from palpate.surrogates.lumps.lump_contrast import LumpContrast, LumpRoom
+from palpate.surrogates.lumps.lump_contrast import LumpContrast
+from palpate.surrogates.lumps.lump_room import LumpRoom
 
 __all__ = ["Lump", "LumpContrast", "LumpRoom"]

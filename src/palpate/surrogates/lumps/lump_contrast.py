@@ -25,79 +25,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.checks import own_arrays
 from palpate.errors import UsageError
-from palpate.format import millimetres, share
+from palpate.format import share
 from palpate.network import Network
-from palpate.surrogates.lumps.lump import EDGE, Lump, require_apart
-from palpate.units import Range
+from palpate.surrogates.lumps.lump import Lump, require_apart
+from palpate.surrogates.lumps.lump_room import LumpRoom
 
 if TYPE_CHECKING:
     from palpate.surrogates.energy import LearntEnergy
 
-__all__ = ["LumpContrast", "LumpRoom", "contrast_inputs", "value_and_slopes"]
-
-SLACK = 1e-9  # of a range: a number at its end is inside
-
-
-@dataclass(frozen=True, eq=False)
-class LumpRoom:
-    """The room in a body where lumps were looked up, and their sizes.
-
-    Attributes
-    ----------
-    lower, upper : (3,)
-        Corners in m of the box of a lump's centre.
-    radius : Range
-        Of radii, m.
-    ratio : Range
-        Of ratios of moduli.
-    cover : float
-        Least tissue in m between a lump's edge and the touched surface.
-    """
-
-    lower: np.ndarray
-    upper: np.ndarray
-    radius: Range
-    ratio: Range
-    cover: float = 0.0
-
-    def __post_init__(self) -> None:
-        own_arrays(self, "lower", "upper")
-        fits = self.lower.shape == self.upper.shape == (3,) and bool((self.lower < self.upper).all())
-        if not fits or self.radius.low <= 0 or self.ratio.low <= 0:
-            raise UsageError(
-                f"There is no room for lumps from {self.lower} to {self.upper} m.",
-                why="The lower corner must lie below the upper one, and radius and ratio are positive.",
-                fix="Give two corners of a box inside the body, in m.",
-            )
-
-    def require(self, lump: Lump) -> None:
-        """Refuse a lump that lies outside or has another size.
-
-        Raises
-        ------
-        UsageError
-            If its centre, its radius or its ratio is beyond what was looked up.
-        """
-        place, spans = np.array(lump.place), self.upper - self.lower
-        low, high = (millimetres(*corner) for corner in (self.lower, self.upper))
-        if (place < self.lower - SLACK * spans).any() or (place > self.upper + SLACK * spans).any():
-            raise UsageError(
-                f"The {lump} is outside the room for lumps.",
-                why=f"Their centres may lie between {low} and {high} in the body's frame.",
-                fix="Move it there, or learn a body with more room.",
-            )
-        for what, value, own, scale, unit in (
-            ("radius", lump.radius, self.radius, 1e3, " mm"),
-            ("ratio", lump.ratio, self.ratio, 1.0, ""),
-        ):
-            if not own.low * (1 - SLACK) <= value <= own.high * (1 + SLACK):
-                raise UsageError(
-                    f"The {what} of the {lump} is {scale * value:.3g}{unit}.",
-                    why=f"It was learnt for {scale * own.low:.3g} to {scale * own.high:.3g}{unit}.",
-                    fix=f"Choose a {what} between these.",
-                )
+__all__ = ["LumpContrast", "contrast_inputs", "value_and_slopes"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,9 +126,9 @@ class LumpContrast:
         Raises
         ------
         UsageError
-            If a lump leaves its room, two meet, or one comes out of the touched surface.
+            If a lump leaves its room or the skin, or two meet.
         """
-        self.require(energy, lumps)
+        self.require(lumps)
         U, force, _ = energy.response(X)
         touching = U > 0
         total, slopes = np.zeros(len(X)), np.zeros((len(X), 3))
@@ -201,8 +138,8 @@ class LumpContrast:
             slopes[touching] += slope
         return U * (1.0 + total), force * (1.0 + total)[:, None] - U[:, None] * slopes
 
-    def require(self, energy: LearntEnergy, lumps: Sequence[Lump]) -> None:
-        """Refuse lumps that leave their room, meet, or come out of the touched surface.
+    def require(self, lumps: Sequence[Lump]) -> None:
+        """Refuse lumps that leave their room or the skin, or meet.
 
         Raises
         ------
@@ -212,16 +149,6 @@ class LumpContrast:
         require_apart(tuple(lumps))
         for lump in lumps:
             self.room.require(lump)
-            # the depth of a ball at the lump's centre is its radius and the cover of that centre
-            cover = float(energy.depth(np.array([lump.place]))[0]) - energy.baseline.radius
-            least = EDGE * lump.radius + self.room.cover
-            if cover < least * (1 - SLACK):
-                raise UsageError(
-                    f"The {lump} leaves the skin.",
-                    why=f"Its centre is {1e3 * cover:.3g} mm below the touched surface; with its edge and the tissue over "
-                    f"it, it needs {1e3 * least:.3g} mm.",
-                    fix=f"Move it {1e3 * (least - cover):.2g} mm deeper, or make it smaller.",
-                )
 
 
 def closed_form(

@@ -1,7 +1,7 @@
 """Lumps as further units of a body's network: the body with them is a learnt body like any other.
 
 With ΔU/U of the lumps known in closed form, U (1 + Σ ΔU/U) = U₀ exp(ℓ + f), f = ln(1 + Σ ΔU/U). Over the places of a
-hand f is smooth, and nothing but near the lumps. So f and its slopes are taken at places about them, and Gaussians of
+hand f is smooth, and nothing but near the lumps. So f and its slopes are taken at places about them, and units of
 one width about some of these places are fitted to both by least squares. The units join those of ℓ: loop, page and
 every export evaluate the body with lumps by what they have, in the time of a few more units.
 """
@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.network.radial import RadialFunction, radial
 from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.lumps.lump import Lump
 from palpate.surrogates.lumps.lump_contrast import LumpContrast
@@ -42,7 +43,7 @@ def energy_with_lumps(energy: LearntEnergy, contrast: LumpContrast, lumps: Seque
             why=f"The inputs of this one are {', '.join(r.name for r in energy.inputs)}.",
             fix="Learn the body with fixed numbers.",
         )
-    contrast.require(energy, lumps)
+    contrast.require(lumps)
     felt = [lump for lump in lumps if lump.ratio != 1.0]
     if not felt:
         return energy
@@ -78,9 +79,9 @@ def _log_factor(
 def _with_units(
     energy: LearntEnergy, X: np.ndarray, f: np.ndarray, slopes: np.ndarray, about: np.ndarray, units: int
 ) -> LearntEnergy:
-    """Return the energy whose ℓ has Gaussians more, which are f (N,) and its slopes (N, 3) at X (N, 3)."""
+    """Return the energy whose ℓ has units more, which are f (N,) and its slopes (N, 3) at X (N, 3)."""
     centres = _spread(about, min(units, len(about)))
-    fits = [_fit(X, f, slopes, centres, width) for width in WIDTHS]
+    fits = [_fit(energy.network.radial, X, f, slopes, centres, width) for width in WIDTHS]
     weights, _, width = min(fits, key=lambda fit: fit[1])
     network, half = energy.network, energy.network.scaling.input_half
     rank = network.factors.shape[1]
@@ -101,12 +102,15 @@ def _with_units(
 
 
 def _fit(
-    X: np.ndarray, f: np.ndarray, slopes: np.ndarray, centres: np.ndarray, width: float
+    kind: RadialFunction, X: np.ndarray, f: np.ndarray, slopes: np.ndarray, centres: np.ndarray, width: float
 ) -> tuple[np.ndarray, float, float]:
-    """Return weights of Gaussians about centres, the mean square error of slopes and values, and the width in m."""
+    """Return weights of units about centres, the mean square error of slopes and values, and the width in m.
+
+    The units are of the body's own radial function: a network has one.
+    """
     far = (X[:, None] - centres[None]) / width
-    phi = np.exp(-(far**2).sum(axis=2))
-    rows = np.concatenate([phi, *(-2.0 * far[:, :, i] * phi for i in range(3))])
+    phi, by_square, _ = radial(kind, (far**2).sum(axis=2))
+    rows = np.concatenate([phi, *(2.0 * far[:, :, i] * by_square for i in range(3))])
     target = np.concatenate([f, *(width * slopes.T)])
     normal = rows.T @ rows
     normal[np.diag_indices_from(normal)] += RIDGE * np.trace(normal) / len(normal)

@@ -43,8 +43,8 @@ def contrast_error(subject: Subject) -> ContrastError | str | None:
     judged = presses.judged
     if len(judged) < FEWEST:
         return (
-            f"The contrast of lumps is not judged: it takes {FEWEST} unseen presses whose lump changes the force by 1 % "
-            f"or more, and there are {len(judged)}."
+            f"The contrast of lumps is not judged: it takes {FEWEST} unseen presses whose lump changes the force by "
+            f"1 % or more, and there are {len(judged)}."
         )
     errors = change_errors(lumps, presses.take(judged))
     median, p95 = np.quantile(errors, [0.5, 0.95])

@@ -28,7 +28,8 @@ class TorqueErrors(Figure):
         """Return the errors as a line."""
         return [
             f"torque: off by {share(self.median)} (median), {share(self.p95)} (95th percentile) of the force times "
-            f"{1e3 * self.size:.3g} mm, the tool's size; the largest is {1e3 * self.largest:.3g} mN m; worst {self.worst}"
+            f"{1e3 * self.size:.3g} mm, the tool's size; the largest is {1e3 * self.largest:.3g} mN m; "
+            f"worst {self.worst}"
         ]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.format import length, plain, pressure, share
+from palpate.tools import PosedTool
 
 __all__ = ["LINEAR", "body_words", "solid_words", "strain_words"]
 
@@ -59,11 +60,16 @@ def solid_words(data: Any) -> str:
 
 def _acting(item: Any) -> str:
     """Return what acts on a body in words: a ball or a pad and where; empty for anything else."""
-    if not isinstance(item, Mapping) or not isinstance(item.get("radius"), (int, float)):
+    if not isinstance(item, Mapping):
+        return ""
+    shallow, deep = (1e3 * depth for depth in item.get("depth") or (0.0, 0.0))
+    if item.get("type") == "SurfaceTool":
+        tool = PosedTool.of(item)
+        return f"pressed at {item.get('touches')} by a {tool}, {shallow:.3g} to {deep:.3g} mm deep"
+    if not isinstance(item.get("radius"), (int, float)):
         return ""
     size = f"of radius {length(item['radius'])}"
     if item.get("type") == "SphereProbe":
-        shallow, deep = (1e3 * depth for depth in item.get("depth") or (0.0, 0.0))
         return f"pressed at {item.get('touches')} by a ball {size}, {shallow:.3g} to {deep:.3g} mm deep"
     return f"held at {item.get('touches')} by a glued pad {size}" if item.get("type") == "GluedPad" else ""
 

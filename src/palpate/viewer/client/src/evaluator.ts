@@ -38,6 +38,7 @@ interface Core {
   release(dt: number): number;
   start(): void;
   touch(field: number): number;
+  torque(): number;
 }
 
 /** What a body answers at a place. */
@@ -111,6 +112,11 @@ export class Evaluator {
     this.ask(place, parameters);
     this.core.trust();
     return this.numbers(this.core.answered(), 20)[19]!;
+  }
+
+  /** Torque on a tool where the last answer was asked for, N m. */
+  torque(): Vec3 {
+    return [...this.numbers(this.core.torque(), 3)] as Vec3;
   }
 
   /** Amplitudes (√J) of the indentations at the places that keep them; overwritten by each step. */

@@ -17,7 +17,7 @@ const root = document.documentElement;
 let socket: WebSocket;
 let news: ExamNews | null = null;
 let heard = 0; // ms, when the news came
-let pressed: Vec3 | null = null; // m, where the skin was pressed last
+let pressed: Vec3 | null = null; // m, the probe's centre when it pressed last
 let asked = false; // whether to end has been asked once
 const pins = new Map<HTMLElement, Vec3>();
 
@@ -56,7 +56,7 @@ function wish(what: Partial<ExamWish> & { wish: string }): void {
 }
 
 function follow(frame: Frame): void {
-  if (frame.grabbed && frame.drawn > SHALLOW) pressed = frame.contact;
+  if (frame.grabbed && frame.depth > SHALLOW) pressed = frame.position;
   const ready = news !== null && news.stage !== "ready" && pressed !== null;
   const button = element<HTMLButtonElement>("exam-mark");
   if (button.disabled === ready) button.disabled = !ready;

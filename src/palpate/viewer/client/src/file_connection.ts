@@ -25,6 +25,7 @@ export class FileConnection {
   private hand: Hand | null = null;
   private place: Vec3;
   private force: Vec3 = NOWHERE;
+  private torque: Vec3 = NOWHERE; // of the last answer, on a tool
   private answer: Answer | null = null;
   private parameters: Float32Array;
   private tick = 0;
@@ -102,6 +103,7 @@ export class FileConnection {
       const between = to.map((v, i) => from[i]! + ((v - from[i]!) * k) / count) as Vec3;
       this.answer = this.evaluator.step(between, this.parameters, elapsed / count);
     }
+    if (this.hello.twists) this.torque = this.evaluator.torque();
     this.place = to;
     this.rest?.led(to);
     const size = Math.hypot(...this.answer!.force);
@@ -144,6 +146,12 @@ export class FileConnection {
     return place.map((v, k) => v + (depth - left) * normal[k]!) as Vec3;
   }
 
+  /** A contact point of the body: the core's lies on the surface that takes a tool's places. */
+  private shifted(contact: Vec3): Vec3 {
+    const shift = this.hello.tool?.shift ?? NOWHERE;
+    return contact.map((v, k) => v + shift[k]!) as Vec3;
+  }
+
   /** Displacements (3 N) of a line's nodes, m. */
   private shape(time: number): Float32Array {
     const { line, answer } = this;
@@ -177,6 +185,7 @@ export class FileConnection {
       echo: this.hand?.sent ?? 0,
       position: this.place,
       force: this.force,
+      torque: held ? this.torque : NOWHERE,
       rate: hello.rate, // there is no loop that could be late
       lateness: 0,
       lateness_p50: 0,
@@ -194,7 +203,7 @@ export class FileConnection {
       resting: !held,
       stalled: false,
       parameters: this.parameters,
-      contact: touched ? touched.contact : this.line ? this.nodeAt(displacement) : hello.holds ? hello.centre : NOWHERE,
+      contact: touched ? this.shifted(touched.contact) : this.line ? this.nodeAt(displacement) : hello.holds ? hello.centre : NOWHERE,
       normal: touched ? touched.normal : NOWHERE,
       depth: answer ? answer.depth : 0,
       stiffness: held && answer && contact ? along(answer) : 0,

@@ -60,6 +60,7 @@ export interface Line {
 export interface DrawnTool {
   words: string;
   centre: Vec3;
+  shift: Vec3;
   points: number[];
   normals: number[];
   triangles: number[];
@@ -136,6 +137,7 @@ export interface Hello {
   radius: number;
   radius_parameter: number;
   tool: DrawnTool | null;
+  twists: boolean;
   deepest: number;
   force_max: number;
   stiffness_max: number;
@@ -374,6 +376,8 @@ export interface Frame {
   position: Vec3;
   /** N, on the hand */
   force: Vec3;
+  /** N m, on a tool about its place; zero where none is told */
+  torque: Vec3;
   /** Hz, ticks per second achieved */
   rate: number;
   /** s, the latest tick since the frame before, to a quarter of itself */
@@ -435,6 +439,7 @@ const FRAME_LAYOUT: Layout = [
   ["echo", "f64"],
   ["position", "vec3"],
   ["force", "vec3"],
+  ["torque", "vec3"],
   ["rate", "f32"],
   ["lateness", "f32"],
   ["lateness_p50", "f32"],

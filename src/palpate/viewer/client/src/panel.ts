@@ -76,6 +76,7 @@ export class Panel {
 
   private describe(hello: Hello): void {
     element("pad-words").textContent = hello.pad;
+    element("torque").hidden = !hello.twists;
     about(hello, [
       [hello.holds ? "largest trained displacement" : "deepest trained press", measured(hello.deepest, "m")],
       ["largest trained force", `${tidy(hello.force_max)} N`],
@@ -135,9 +136,11 @@ export class Panel {
     const felt = frame.grabbed;
     const offset = this.hello!.line ? frame.contact : frame.position;
     put("force-norm", Math.hypot(...frame.force), 3);
+    if (this.hello!.twists) put("torque-norm", 1000 * Math.hypot(...frame.torque), 2);
     put("tip-norm", 1000 * Math.hypot(...offset), 1);
     ["x", "y", "z"].forEach((axis, k) => {
       put(`force-${axis}`, frame.force[k]!, 3);
+      if (this.hello!.twists) put(`torque-${axis}`, 1000 * frame.torque[k]!, 2);
       put(`tip-${axis}`, 1000 * offset[k]!, 1);
     });
     put("depth", felt ? 1000 * Math.max(frame.depth, 0) : NaN, 2);
@@ -224,7 +227,7 @@ function subtitle(hello: Hello): (Node | string)[] {
 /** Publish a frame for programs that read the page. */
 function record(frame: Frame): void {
   const data = document.documentElement.dataset;
-  for (const name of ["position", "force", "contact", "parameters"] as const) data[name] = frame[name].join(" ");
+  for (const name of ["position", "force", "torque", "contact", "parameters"] as const) data[name] = frame[name].join(" ");
   for (const name of ["tick", "time", "grabbed", "inside", "loop", "hold", "depth", "deviation"] as const) {
     data[name] = String(frame[name]);
   }

@@ -23,7 +23,18 @@ from palpate.input_files import read_toml
 from palpate.record_complaints import complaints
 from palpate.records import Count, Metres, Newtons, Number, Record
 
-__all__ = ["Plan", "read_plan"]
+__all__ = [
+    "Comparison",
+    "DeviceRules",
+    "Expected",
+    "Placed",
+    "Plan",
+    "Rating",
+    "SittingRules",
+    "Varied",
+    "Wanted",
+    "read_plan",
+]
 
 _LABEL = r"^[A-Za-z0-9]+$"  # BIDS takes letters and digits alone in labels
 
@@ -64,7 +75,7 @@ class Placed(Record):
     """How levels are chosen."""
 
     kind: Literal["adaptive", "constant", "staircase"] = "adaptive"
-    trials: Count = Field(default=80, ge=10, le=2000)  # counted ones, of each condition
+    trials: Count = Field(default=80, ge=2, le=2000)  # counted ones, of each condition
     down: Count = Field(default=2, ge=1, le=6)  # of a staircase: right answers in a row before it goes down
     step_up: Count = Field(default=1, ge=1, le=50)  # of a staircase, in levels
     step_down: Count = Field(default=1, ge=1, le=50)

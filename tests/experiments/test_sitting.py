@@ -1,0 +1,188 @@
+"""Plans, sittings and the folder of an experiment: seeds, interruptions, and what is refused."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from palpate.errors import FileFormatError, StudyError, UsageError
+from palpate.experiments import analyse, read_plan
+from palpate.experiments.ready_plans import KINDS, ready_plan
+from palpate.experiments.sitting import Sitting
+from palpate.experiments.study_folder import Participant, StudyFolder, read_table
+
+
+def write_plan(folder, kind="discrimination", name="trial", **changes):
+    text = ready_plan(kind, name, ["body.palpate", "other.palpate"])
+    for before, after in changes.items():
+        text = text.replace(*after) if isinstance(after, tuple) else text.replace(before, after)
+    file = folder / f"{name}.toml"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def answered(sitting, count=10**6, seed=0):
+    """Rows as a table has them, of so many random answers."""
+    rng, rows = np.random.default_rng(seed), []
+    while len(rows) < count and (trial := sitting.next()) is not None:
+        response = int(rng.integers(1, len(trial.bodies) + 1))
+        rows.append({"response": str(response)})
+        sitting.answer(response)
+    return rows
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_ready_plan_is_a_plan_and_a_sitting_goes_on_from_its_answers(kind, tmp_path):
+    plan = read_plan(write_plan(tmp_path, kind))
+    first = Sitting(plan, "sub-01")
+    rows = answered(first, 30)
+    second = Sitting(plan, "sub-01")
+    second.restore(rows)
+    assert second.next() == first.next()
+    assert second.done == len(rows)
+    rest = answered(second)
+    assert len(rows) + len(rest) == second.total
+    assert second.next() is None
+
+
+def test_people_differ_and_runs_differ(tmp_path):
+    plan = read_plan(write_plan(tmp_path))
+    courses = []
+    for label, run in (("sub-01", 1), ("sub-01", 2), ("sub-02", 1)):
+        sitting, bodies = Sitting(plan, label, run), []
+        for _ in range(30):
+            bodies.append(sitting.next().bodies)
+            sitting.answer(1)
+        courses.append(bodies)
+    assert courses[0] != courses[1] != courses[2] != courses[0]
+
+
+def test_the_right_answer_is_the_stiffer_body(tmp_path):
+    sitting = Sitting(read_plan(write_plan(tmp_path)), "sub-01")
+    for _ in range(60):
+        trial = sitting.next()
+        stiffer = trial.target if trial.value >= 1.0 else 3 - trial.target
+        assert trial.is_correct(stiffer)
+        assert not trial.is_correct(3 - stiffer)
+        sitting.answer(stiffer)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("low = 0.55", "low = 1.2", "softer and stiffer"),
+        ('question = "discrimination"', 'question = "detection"', "an input of the body"),
+        ("trials = 80", "trials = 1", "trials"),
+        ("trials = 80", "trails = 80", "trails"),
+        ("max_force = 3.0", "max_force = 300.0", "max_force"),
+    ],
+)
+def test_a_wrong_plan_is_refused_in_words(before, after, said, tmp_path):
+    file = write_plan(tmp_path, change=(before, after))
+    with pytest.raises(StudyError, match=said):
+        read_plan(file)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    file = write_plan(tmp_path)
+    own = StudyFolder.beside(file)
+    own.prepare(file)
+    return own
+
+
+def run_through(folder, label, count=10**6, seed=0, observer=None):
+    """Answer a sitting as a simulated person, and write its table."""
+    who = Participant(label)
+    folder.enrol(who)
+    files = folder.sitting(who, 1)
+    sitting, rng = Sitting(folder.plan, who.label), np.random.default_rng(seed)
+    while sitting.done < count and (trial := sitting.next()) is not None:
+        p = 0.01 + 0.98 / (1.0 + np.exp(-1.7 * trial.level / 0.2))
+        yes = rng.random() < p
+        response = trial.target if yes else 3 - trial.target
+        row = {"trial": trial.number, "kind": trial.kind, "condition": trial.condition, "part": 1}
+        row |= {"level": f"{trial.level:.9g}", "intervals": ",".join(trial.bodies), "response": response}
+        row |= {"correct": int(trial.is_correct(response)), "limits_hit": 0, "clock_jump": "0"}
+        files.append(row)
+        sitting.answer(response)
+    return files
+
+
+def test_analysis_finds_each_person_and_the_group(folder):
+    for k in range(1, 4):
+        run_through(folder, f"{k:02d}", seed=k)
+    run_through(folder, "09", count=20)
+    result = analyse(folder)
+    assert [p.participant for p in result.people] == ["sub-01", "sub-02", "sub-03"]
+    assert any("sub-09" in text for text in result.left_out)
+    (group,) = result.groups
+    assert group.location.low < 0.0 < group.location.high
+    assert group.log_spread.low < np.log(0.6745 * 0.2) < group.log_spread.high
+    json.dumps(result.as_dict())
+    assert "Weber fraction" in str(result)
+
+
+def test_a_line_that_a_kill_cut_off_is_left_out(folder):
+    files = run_through(folder, "01", count=7)
+    whole = files.table.read_bytes()
+    with files.table.open("ab") as table:
+        table.write(b"3.2\t1.0\t1\t8\ttri")
+    assert len(files.rows()) == 7
+    assert files.table.read_bytes() == whole
+
+
+def test_nothing_is_overwritten(folder, tmp_path):
+    files = run_through(folder, "01", count=3)
+    first = files.recording(4, 1)
+    first.write_bytes(b"a touch")
+    assert files.recording(4, 1) != first
+    files.describe({"part": 1})
+    files.describe({"part": 2})
+    assert len(list(files.folder.glob("*_beh.json"))) == 2
+    changed = write_plan(tmp_path, change=("trials = 80", "trials = 60"))
+    with pytest.raises(UsageError, match="has changed since the first sitting"):
+        folder.prepare(changed)
+
+
+def test_two_programs_do_not_run_one_sitting(folder):
+    files = run_through(folder, "01", count=3)
+    with files.held(), pytest.raises(UsageError, match="another process"), files.held():
+        pass
+    with files.held():
+        pass
+
+
+def test_forget_removes_a_person_and_nobody_else(folder):
+    for label in ("01", "02"):
+        run_through(folder, label, count=3)
+    assert folder.forget(Participant("sub-01")) == 1
+    assert folder.people() == ["sub-02"]
+    assert [row["participant_id"] for row in read_table(folder.root / "participants.tsv")] == ["sub-02"]
+    assert not [p for p in folder.root.rglob("*") if "sub-01" in p.name]
+    with pytest.raises(UsageError, match="is not in"):
+        folder.forget(Participant("sub-01"))
+
+
+def test_a_label_is_no_name_and_no_path():
+    for label in ("../elsewhere", "Anna Berg", "sub-", "a/b"):
+        with pytest.raises(UsageError, match="label"):
+            Participant(label)
+
+
+def test_a_damaged_table_is_refused(folder):
+    files = run_through(folder, "01", count=3)
+    with files.table.open("a", encoding="utf-8") as table:
+        table.write("1\t2\n")
+    with pytest.raises(FileFormatError, match="columns"):
+        analyse(folder)
+
+
+def test_each_column_has_a_meaning(folder):
+    files = run_through(folder, "01", count=3)
+    header = files.table.read_text("utf-8").splitlines()[0].split("\t")
+    described = json.loads((folder.root / "task-trial_events.json").read_text("utf-8"))
+    assert header == list(described)
+    assert all(described[name]["Description"] for name in header)

@@ -18,7 +18,6 @@ from palpate.runtime.touchable import touchable
 from palpate.surrogates.baselines import PosedBaseline, deepest_ball
 from palpate.tools import Capsule, PosedTool, Punch, Sphere, left_jacobian
 from palpate.validation import TouchSolves
-from palpate.viewer.page_model import PageModel
 from pressed import DEEPEST, RADIUS
 
 # from the place to the ball's centre, and to where the dataset's mesh has its plane
@@ -74,11 +73,8 @@ def test_a_hand_feels_it_at_the_foremost_point(ball):
 
 @pytest.mark.full
 def test_what_does_not_know_tools_refuses_them(ball, tmp_path):
-    with pytest.raises(UsageError, match="be drawn on a page yet"):
-        PageModel(touchable(ball))
-    for export in (export_c, export_onnx):
-        with pytest.raises(UsageError, match="can't be exported yet"):
-            export(ball, tmp_path / "ball.onnx")
+    with pytest.raises(UsageError, match="tells no torque"):
+        ball.torque(pressed.places(1) - WAY)
     with pytest.raises(UsageError, match="solves of the tool that"):
         pp.validate(ball, under(PosedTool(Capsule(0.006, 0.03))))
 
@@ -142,6 +138,14 @@ def test_an_orientation_that_is_an_input_is_learnt_with_its_torque():
     slopes = np.array([(energy.energy(X - step) - energy.energy(X + step)) / 2e-4 for step in steps]).T
     torque = np.linalg.norm(slopes - wanted[:, 3:], axis=1) / (size * RADIUS)
     assert np.median(torque[inside]) < 0.02
+
+
+@pytest.mark.full
+def test_a_body_under_a_tool_leaves_as_c_and_onnx(ball, tmp_path):
+    for export, name in ((export_c, "ball"), (export_onnx, "ball.onnx")):
+        comparison = export(ball, tmp_path / name).comparison
+        assert comparison is not None
+        assert comparison.passed
 
 
 def test_the_deepest_point_of_a_tilted_tool():

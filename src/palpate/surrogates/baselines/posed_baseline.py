@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -108,30 +109,22 @@ class PosedBaseline(ToolBaseline):
         return self.name
 
     def c_source(self) -> str:
-        """Refuse: it has no exported form yet.
-
-        Raises
-        ------
-        UsageError
-            Always.
-        """
-        raise self._unexported()
+        """Return the kernels in C99, those of a contact before them."""
+        own = Path(__file__).with_suffix(".c").read_text("utf-8")
+        return f"{super().c_source()}\n{own}"
 
     def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
-        """Refuse: it has no exported form yet.
+        """Refuse: the mean over its balls has no form as a graph.
 
         Raises
         ------
         UsageError
             Always.
         """
-        raise self._unexported()
-
-    def _unexported(self) -> UsageError:
-        return UsageError(
-            f"A body under {self.probe_words} can't be exported yet.",
-            why="Its baseline, that of a tool that turns or of a curved surface, has no exported form.",
-            fix="Ask it in Python, feel it by `palpate run`, or learn a tool of one orientation on a plane surface.",
+        raise UsageError(
+            f"A body under {self.probe_words} has no ONNX form.",
+            why="Its baseline is that of a tool that turns or of a curved surface.",
+            fix="Ask it in Python, or learn a tool of one orientation on a plane surface.",
         )
 
     def coordinate(self, X: np.ndarray) -> np.ndarray:

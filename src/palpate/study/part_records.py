@@ -145,7 +145,7 @@ class PartSurfaceRecord(Record):
 
 
 class PartRecord(Record):
-    """A part from a file: a surface such as STL, CAD such as STEP, a volume mesh such as VTU, or the labelmap of a scan."""
+    """A part from a file: a surface such as STL, CAD such as STEP, a mesh such as VTU, or the labelmap of a scan."""
 
     INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "tool", "pad")
 

@@ -69,12 +69,12 @@ class PosedBaseline(ToolBaseline):
     tool : str
         The tool's description as JSON, from which `PosedTool.of` makes it.
     order : float
-        m, at least 2.
+        m, at least 2; the larger, the more the deepest ball counts.
     """
 
     name: ClassVar[str] = "posed"
 
-    order: float = 4.0
+    order: float = 8.0
 
     @cached_property
     def balls(self) -> np.ndarray:

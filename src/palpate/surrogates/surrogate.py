@@ -19,10 +19,11 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.format import count, millimetres, share
+from palpate.format import count, millimetres
 from palpate.network import Network, load_archive
 from palpate.network.codec import load_value, save_value
 from palpate.page_hook import page_of
+from palpate.surrogates.correction_record import training_words
 from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.fields import (
     Field,
@@ -44,7 +45,7 @@ from palpate.surrogates.moving_rest import Followed, follow
 from palpate.surrogates.tool_friction import with_friction
 from palpate.units import Quantity, Range, bounds
 
-__all__ = ["KIND", "Surrogate", "correction_count", "correction_warning"]
+__all__ = ["KIND", "Surrogate"]
 
 _NAMED = 6  # numbers that are named in a line
 _SAMPLES = 4096  # places in the trained ranges, among which a typical press is found
@@ -142,7 +143,7 @@ class Surrogate:
         return cls(meta=meta, quantities={"outputs": LearntQuantities(learnt)})
 
     def __str__(self) -> str:
-        head = f"Surrogate {self.name!r}: {self.purpose}{_training(self.meta)}{self._remembers}"
+        head = f"Surrogate {self.name!r}: {self.purpose}{training_words(self.meta)}{self._remembers}"
         energy = "" if self.energy is None else f"; {self.energy}"
         ranges = f"  {', '.join(str(r) for r in self.inputs)}{energy}"
         parts = [*self.quantities.values(), *self.fields.values()]
@@ -214,14 +215,7 @@ class Surrogate:
         UsageError
             If the body tells none: a ball feels no torque about its centre.
         """
-        evaluator = self.torque_evaluator
-        if evaluator is None:
-            raise UsageError(
-                f"{self.name!r} tells no torque.",
-                why="It was learnt from solves without one, such as those under a ball.",
-                fix="Sweep under a pp.SurfaceTool, and learn from 20 solves or more.",
-            )
-        return torques(self.hand_energy, evaluator, X)
+        return torques(self.hand_energy, self.torque_evaluator, X, self.name)
 
     @property
     def _remembers(self) -> str:
@@ -504,32 +498,3 @@ class Surrogate:
                 fix="Learn it again from its solves: `palpate learn STUDY.toml`, or pp.learn(data)[0].save(file).",
             )
         return load_value(path, cls, kind=KIND, noun="a learnt body")
-
-
-def _training(meta: Mapping[str, Any]) -> str:
-    """Return in words what the record tells of training and correction."""
-    words = ""
-    if "solves" in meta:
-        words += f"; trained with {meta['solves']} solves"
-        if meta.get("samples", meta["solves"]) != meta["solves"]:
-            words += f" ({meta['samples']} samples by symmetry)"
-    error = meta.get("force_error")
-    if isinstance(error, Mapping) and {"median", "p95"} <= error.keys():
-        words += f"; force error {share(error['median'])} median, {share(error['p95'])} p95"
-    if (touches := correction_count(meta)) is not None:
-        words += f"; corrected by {touches} measured touches"
-        words += ", with a warning" if correction_warning(meta) else ""
-    return words
-
-
-def correction_count(meta: Mapping[str, Any]) -> int | None:
-    """Return how many measured touches have corrected a body; None for one as it was learnt."""
-    record = meta.get("correction")
-    counts = record.get("counts") if isinstance(record, Mapping) else None
-    return int(counts.get("learnt", 0)) if isinstance(counts, Mapping) else None
-
-
-def correction_warning(meta: Mapping[str, Any]) -> str:
-    """Return what was suspicious of the measurements that have corrected a body; "" if nothing was."""
-    record = meta.get("correction")
-    return str(record.get("warning", "")) if isinstance(record, Mapping) else ""

@@ -78,7 +78,9 @@ class TorqueEvaluator:
 
 
 @kernel
-def torque_into(position, parameters, force, ends, x, torque, work, steps, layout, scales, units, rows, modes, constants):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201, E501
+def torque_into(
+    position, parameters, force, ends, x, torque, work, steps, layout, scales, units, rows, modes, constants
+):  # type: ignore[no-untyped-def]  # noqa: ANN001, E501
     """Fill ‖F‖ a (3,) at a place (3,) and further inputs (p,), each within its `ends` (2, n); x (n,) is scratch."""
     size = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
     if size == 0.0:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.format import count, millimetres, share
+from palpate.format import count, millimetres
 from palpate.network import Network, load_archive
 from palpate.network.codec import load_value, save_value
 from palpate.page_hook import page_of
@@ -42,9 +42,10 @@ from palpate.surrogates.memories.friction import MINDLIN
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.surrogates.moving_rest import Followed, follow
 from palpate.surrogates.tool_friction import with_friction
+from palpate.surrogates.training_record import training_in_words
 from palpate.units import Quantity, Range, bounds
 
-__all__ = ["KIND", "Surrogate", "correction_count", "correction_warning"]
+__all__ = ["KIND", "Surrogate"]
 
 _NAMED = 6  # numbers that are named in a line
 _SAMPLES = 4096  # places in the trained ranges, among which a typical press is found
@@ -142,7 +143,7 @@ class Surrogate:
         return cls(meta=meta, quantities={"outputs": LearntQuantities(learnt)})
 
     def __str__(self) -> str:
-        head = f"Surrogate {self.name!r}: {self.purpose}{_training(self.meta)}{self._remembers}"
+        head = f"Surrogate {self.name!r}: {self.purpose}{training_in_words(self.meta)}{self._remembers}"
         energy = "" if self.energy is None else f"; {self.energy}"
         ranges = f"  {', '.join(str(r) for r in self.inputs)}{energy}"
         parts = [*self.quantities.values(), *self.fields.values()]
@@ -369,14 +370,8 @@ class Surrogate:
     def with_lumps(self, lumps: Iterable[Lump]) -> Surrogate:
         """Return the body with hidden lumps: what a hand feels of it changes, what is drawn and remembered does not.
 
-        The energy of the lumps is added to that of the body, which holds while they are apart. The new body has
-        further units in its network and is evaluated, saved and exported as any other; its file holds the lumps as
-        numbers that whoever opens it can read.
-
-        Parameters
-        ----------
-        lumps : iterable of Lump
-            Balls in the room that ``self.lumps.room`` tells; none for the body without.
+        Their energies add, which holds while they are apart. The new body is evaluated, saved and exported as any
+        other; its file tells whoever opens it where they are. They lie in ``self.lumps.room``.
 
         Raises
         ------
@@ -387,7 +382,7 @@ class Surrogate:
         if self.lumps is None:
             raise UsageError(
                 f"{self.name!r} knows nothing of lumps.",
-                why="It was learnt from presses whose strain energy was not looked up.",
+                why="It was learnt from presses in which none were looked up.",
                 fix="Sweep a `palpate.LumpProblem` and learn that.",
             )
         hidden = [[*lump.place, lump.radius, lump.ratio] for lump in chosen]
@@ -504,32 +499,3 @@ class Surrogate:
                 fix="Learn it again from its solves: `palpate learn STUDY.toml`, or pp.learn(data)[0].save(file).",
             )
         return load_value(path, cls, kind=KIND, noun="a learnt body")
-
-
-def _training(meta: Mapping[str, Any]) -> str:
-    """Return in words what the record tells of training and correction."""
-    words = ""
-    if "solves" in meta:
-        words += f"; trained with {meta['solves']} solves"
-        if meta.get("samples", meta["solves"]) != meta["solves"]:
-            words += f" ({meta['samples']} samples by symmetry)"
-    error = meta.get("force_error")
-    if isinstance(error, Mapping) and {"median", "p95"} <= error.keys():
-        words += f"; force error {share(error['median'])} median, {share(error['p95'])} p95"
-    if (touches := correction_count(meta)) is not None:
-        words += f"; corrected by {touches} measured touches"
-        words += ", with a warning" if correction_warning(meta) else ""
-    return words
-
-
-def correction_count(meta: Mapping[str, Any]) -> int | None:
-    """Return how many measured touches have corrected a body; None for one as it was learnt."""
-    record = meta.get("correction")
-    counts = record.get("counts") if isinstance(record, Mapping) else None
-    return int(counts.get("learnt", 0)) if isinstance(counts, Mapping) else None
-
-
-def correction_warning(meta: Mapping[str, Any]) -> str:
-    """Return what was suspicious of the measurements that have corrected a body; "" if nothing was."""
-    record = meta.get("correction")
-    return str(record.get("warning", "")) if isinstance(record, Mapping) else ""

@@ -24,7 +24,7 @@ from palpate.surrogates.lumps.lump_contrast import LumpContrast, closed_form, co
 from palpate.surrogates.lumps.lump_room import LumpRoom, skin_of
 from palpate.units import Quantity, Range
 
-__all__ = ["LEAST_CONTRAST", "LumpPresses", "learn_lumps"]
+__all__ = ["LEAST_CONTRAST", "LumpPresses", "change_errors", "learn_lumps"]
 
 LEAST_CONTRAST = 0.01  # of the force: a change below it is felt by nobody, and is not judged
 FELT = 0.003  # ΔU/U at which a lookup counts half

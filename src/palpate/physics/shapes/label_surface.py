@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-
 from typing import Any
 
 import numpy as np
@@ -104,7 +103,8 @@ class _Lattice:
 
     def cells(self) -> np.ndarray:
         """Return the label with the largest share at each point, (a, b, c) int; edges that are shared by four surfaces
-        are removed."""
+        are removed.
+        """
         return _thicken(np.asarray(self.shares.argmax(axis=0)))
 
     def at(self, label: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -16,7 +16,13 @@ from palpate.errors import UsageError
 from palpate.file_kinds import SCAN_ENDINGS, part_kind
 from palpate.format import millimetres
 from palpate.physics.apart import mesh_apart, read_apart
-from palpate.physics.shapes.body_file import SurfacePatch, apply_patches, digest_of, require_same, tell_repairs
+from palpate.physics.shapes.body_file import (
+    SurfacePatch,
+    apply_patches,
+    digest_of,
+    require_same,
+    tell_repairs,
+)
 from palpate.physics.shapes.label_surface import LabelSurface, label_surface
 from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volumes, to_ngsolve
 from palpate.physics.shapes.mesh_file import refine_mesh

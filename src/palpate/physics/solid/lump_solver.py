@@ -21,7 +21,7 @@ from palpate.surrogates.lumps.lump import EDGE, MIX, Lump, share_of_lump
 if TYPE_CHECKING:
     from palpate.physics.solid.lump_problem import LumpProblem
 
-__all__ = ["LumpSolution", "LumpSolver"]
+__all__ = ["LumpSolution", "LumpSolver", "LumpedPress"]
 
 NO_LUMP = (0.0, 0.0, 0.0, 1.0, 1.0)  # x, y, z, radius (m) and ratio
 NEAR = 0.014  # m beyond the ball: half the lumps are looked up within that, where they are felt

@@ -11,7 +11,7 @@ from __future__ import annotations
 import html
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -367,7 +367,7 @@ class Surrogate:
             memory = memory.spread(self._patches(spacing), spacing)
         return replace(self, memory=memory)
 
-    def with_lumps(self, lumps: Iterable[Lump]) -> Surrogate:
+    def with_lumps(self, lumps: Sequence[Lump]) -> Surrogate:
         """Return the body with hidden lumps: what a hand feels of it changes, what is drawn and remembered does not.
 
         Their energies add, which holds while they are apart. The new body is evaluated, saved and exported as any
@@ -378,15 +378,14 @@ class Surrogate:
         UsageError
             If the body was not learnt with lumps, or one leaves its room or the skin, or two meet.
         """
-        chosen = tuple(lumps)
         if self.lumps is None:
             raise UsageError(
                 f"{self.name!r} knows nothing of lumps.",
                 why="It was learnt from presses in which none were looked up.",
                 fix="Sweep a `palpate.LumpProblem` and learn that.",
             )
-        hidden = [[*lump.place, lump.radius, lump.ratio] for lump in chosen]
-        energy = energy_with_lumps(self.hand_energy, self.lumps, chosen)
+        hidden = [[*lump.place, lump.radius, lump.ratio] for lump in lumps]
+        energy = energy_with_lumps(self.hand_energy, self.lumps, lumps)
         return replace(self, energy=energy, lumps=None, meta={**self.meta, "lumps": hidden})
 
     def with_friction(

@@ -162,4 +162,4 @@ def spread_rows(Z: np.ndarray, count: int) -> np.ndarray:
     while len(chosen) < count:
         chosen.append(int(nearest.argmax()))
         nearest = np.minimum(nearest, ((some - some[chosen[-1]]) ** 2).sum(axis=1))
-    return some[chosen]
+    return np.asarray(some[chosen])

@@ -11,7 +11,7 @@ from __future__ import annotations
 import html
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,6 @@ from palpate.format import count, millimetres
 from palpate.network import Network, load_archive
 from palpate.network.codec import load_value, save_value
 from palpate.page_hook import page_of
-from palpate.surrogates.correction_record import training_words
 from palpate.surrogates.energy import LearntEnergy
 from palpate.surrogates.fields import (
     Field,
@@ -43,6 +42,7 @@ from palpate.surrogates.memories.friction import MINDLIN
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.surrogates.moving_rest import Followed, follow
 from palpate.surrogates.tool_friction import with_friction
+from palpate.surrogates.training_record import training_in_words
 from palpate.units import Quantity, Range, bounds
 
 __all__ = ["KIND", "Surrogate"]
@@ -143,7 +143,7 @@ class Surrogate:
         return cls(meta=meta, quantities={"outputs": LearntQuantities(learnt)})
 
     def __str__(self) -> str:
-        head = f"Surrogate {self.name!r}: {self.purpose}{training_words(self.meta)}{self._remembers}"
+        head = f"Surrogate {self.name!r}: {self.purpose}{training_in_words(self.meta)}{self._remembers}"
         energy = "" if self.energy is None else f"; {self.energy}"
         ranges = f"  {', '.join(str(r) for r in self.inputs)}{energy}"
         parts = [*self.quantities.values(), *self.fields.values()]
@@ -360,32 +360,25 @@ class Surrogate:
             memory = memory.spread(self._patches(spacing), spacing)
         return replace(self, memory=memory)
 
-    def with_lumps(self, lumps: Iterable[Lump]) -> Surrogate:
+    def with_lumps(self, lumps: Sequence[Lump]) -> Surrogate:
         """Return the body with hidden lumps: what a hand feels of it changes, what is drawn and remembered does not.
 
-        The energy of the lumps is added to that of the body, which holds while they are apart. The new body has
-        further units in its network and is evaluated, saved and exported as any other; its file holds the lumps as
-        numbers that whoever opens it can read.
-
-        Parameters
-        ----------
-        lumps : iterable of Lump
-            Balls in the room that ``self.lumps.room`` tells; none for the body without.
+        Their energies add, which holds while they are apart. The new body is evaluated, saved and exported as any
+        other; its file tells whoever opens it where they are. They lie in ``self.lumps.room``.
 
         Raises
         ------
         UsageError
             If the body was not learnt with lumps, or one leaves its room or the skin, or two meet.
         """
-        chosen = tuple(lumps)
         if self.lumps is None:
             raise UsageError(
                 f"{self.name!r} knows nothing of lumps.",
-                why="It was learnt from presses whose strain energy was not looked up.",
+                why="It was learnt from presses in which none were looked up.",
                 fix="Sweep a `palpate.LumpProblem` and learn that.",
             )
-        hidden = [[*lump.place, lump.radius, lump.ratio] for lump in chosen]
-        energy = energy_with_lumps(self.hand_energy, self.lumps, chosen)
+        hidden = [[*lump.place, lump.radius, lump.ratio] for lump in lumps]
+        energy = energy_with_lumps(self.hand_energy, self.lumps, lumps)
         return replace(self, energy=energy, lumps=None, meta={**self.meta, "lumps": hidden})
 
     def with_friction(

@@ -59,12 +59,14 @@ class Sitting:
         self.process = subprocess.Popen(
             [*command, "--port", "0", *options], cwd=plan.parent, stderr=subprocess.PIPE, text=True
         )
-        urls = {}
+        urls, said = {}, []
         for line in self.process.stderr:
+            said.append(line)
             if known := re.match(r"(participant|control): +(http\S+)", line):
                 urls[known[1]] = known[2]
             if len(urls) == 2:
                 break
+        assert len(urls) == 2, "".join(said)
         self.complaints = []
         self.page, self.control = (self._open(browser, urls[name]) for name in ("participant", "control"))
 

@@ -125,6 +125,7 @@ def _body(what: str) -> tuple[ExamKind, Surrogate]:
     from palpate.experiments.exam_kinds import KINDS, kind_of_body
     from palpate.learning.loading import load_surrogate
     from palpate.runtime.touchable import touchable
+    from palpate.surrogates.baselines import require_ball
     from palpate.surrogates.shipped_bodies import shipped_body
 
     if what in KINDS:
@@ -136,10 +137,11 @@ def _body(what: str) -> tuple[ExamKind, Surrogate]:
         checks.one_of("What is examined", what, tuple(KINDS))
     surrogate = load_surrogate(path)
     body = touchable(surrogate)
+    require_ball(body.energy.baseline, "be examined")
     if body.holds or body.surface is None or body.parameters:
         raise UsageError(
             f"{path} can't be examined.",
-            why="An examination presses the surface of a body by a free probe, without further inputs.",
+            why="An examination presses the surface of a body by a free ball, without further inputs.",
             fix="Take a body of `palpate touch`, or breast, prostate or skin.",
         )
     return kind_of_body(path.stem, body), surrogate

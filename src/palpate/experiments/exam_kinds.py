@@ -91,9 +91,10 @@ def hide_lumps(
     """
     rng = np.random.default_rng(seed)
     touched = surface.inner(max(kind.diameters) / 2.0)  # so that a hand can press all around a lump
-    if rng.random() < _NONE or not len(touched) or body.surface is None:
+    areas = surface.areas[touched]
+    if rng.random() < _NONE or body.surface is None or not areas.any():
         return ()
-    shares = surface.areas[touched] / surface.areas[touched].sum()
+    shares = areas / areas.sum()
     _, slope, _ = body.surface.at(surface.points[touched])
     normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
     sorts = _sorts(kind, learnt)

@@ -126,9 +126,15 @@ def _body(what: str) -> tuple[ExamKind, Surrogate]:
     from palpate.learning.loading import load_surrogate
     from palpate.runtime.touchable import touchable
     from palpate.surrogates.baselines import require_ball
-    from palpate.surrogates.shipped_bodies import shipped_body
+    from palpate.surrogates.shipped_bodies import FOLDER, shipped_body
 
     if what in KINDS:
+        if not (FOLDER / f"{what}.palpate").is_file():
+            raise UsageError(
+                f"The body of {what} is not in this installation.",
+                why="It is learnt from solves that take some minutes.",
+                fix=f"In a clone, python -m benchmarks.shipped_bodies {what} makes it; {_there()}",
+            )
         return KINDS[what], shipped_body(what)
     path = Path(what)
     if path.suffix == ".toml":
@@ -145,6 +151,14 @@ def _body(what: str) -> tuple[ExamKind, Surrogate]:
             fix="Take a body of `palpate touch`, or breast, prostate or skin.",
         )
     return kind_of_body(path.stem, body), surrogate
+
+
+def _there() -> str:
+    """Return which bodies can be examined at once, in words."""
+    from palpate.surrogates.shipped_bodies import FOLDER
+
+    names = sorted(path.stem for path in FOLDER.glob("*.palpate"))
+    return f"or examine {' or '.join(names)}." if names else "or examine a body of your own."
 
 
 def _learnt_study(path: Path) -> Path:

@@ -56,7 +56,8 @@ def test_the_body_with_lumps_has_the_energy_and_force_of_the_closed_form(body):
     felt = body.with_lumps(lumps).energy
     change = np.linalg.norm(force - bare, axis=1)
     missed = np.linalg.norm(felt.force(X) - force, axis=1) / change
-    assert np.quantile(missed[change > 0.01 * np.linalg.norm(bare, axis=1)], 0.95) < 0.03
+    # less than half of what learning may miss of the change
+    assert np.quantile(missed[change > 0.01 * np.linalg.norm(bare, axis=1)], 0.95) < 0.05
     assert np.median(np.abs(felt.energy(X) - U) / (U - plain)) < 0.01
 
 

@@ -46,8 +46,8 @@ def deck(
     lines += ["*BOUNDARY", "BOTTOM, 1, 3", "ALL, 2, 2", "TOOLNODES, 2, 2"]
     for slip, depth in motion:
         lines += [
-            *("*STEP, NLGEOM, INC=400", "*STATIC", "0.25, 1., 1e-4, 0.5", "*BOUNDARY"),
-            *(f"TOOLNODES, 1, 1, {slip / MILLI!r}", f"TOOLNODES, 3, 3, {-depth / MILLI!r}"),
+            *("*STEP, NLGEOM, INC=400", "*STATIC", "0.5, 1., 1e-4, 1.", "*BOUNDARY"),
+            *(f"TOOLNODES, 1, 1, {float(slip) / MILLI!r}", f"TOOLNODES, 3, 3, {-float(depth) / MILLI!r}"),
             *("*NODE PRINT, NSET=TOOLNODES, TOTALS=ONLY, FREQUENCY=1000", "RF", "*END STEP"),
         ]
     return "\n".join(lines) + "\n"

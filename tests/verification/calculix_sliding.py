@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from calculix_ball import CORNERS, KILO, MIDDLES, MILLI, graded
 
-PENALTY = 300.0  # stiffness of the normal penalty over E and the reach
-STICK = 1.0  # slope of the tangential penalty over that of the normal one
+PENALTY = 150.0  # stiffness of the normal penalty over E and the reach
+STICK = 0.05  # slope of the tangential penalty over that of the normal one
 THICK = 1.0  # mm, of slice and tool
 
 
@@ -46,7 +46,7 @@ def deck(
     lines += ["*BOUNDARY", "BOTTOM, 1, 3", "ALL, 2, 2", "TOOLNODES, 2, 2"]
     for slip, depth in motion:
         lines += [
-            *("*STEP, NLGEOM, INC=400", "*STATIC", "0.5, 1., 1e-4, 1.", "*BOUNDARY"),
+            *("*STEP, NLGEOM, INC=400", "*STATIC", "0.2, 1., 1e-4, 0.4", "*BOUNDARY"),
             *(f"TOOLNODES, 1, 1, {float(slip) / MILLI!r}", f"TOOLNODES, 3, 3, {-float(depth) / MILLI!r}"),
             *("*NODE PRINT, NSET=TOOLNODES, TOTALS=ONLY, FREQUENCY=1000", "RF", "*END STEP"),
         ]

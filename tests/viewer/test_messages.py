@@ -84,7 +84,9 @@ HELLO = Hello(
     device="",
     meta={"errors": {"rmse": 1e-5}, "seed": 3},
 )
-TOOL = DrawnTool("box", (0.0, 0.0, 1.0), (0.0, 0.0, 0.5), (0.0, 0.5, 1.0), (0.0, 0.0, -1.0), (0, 0, 0), (-1, -1, 0))
+TOOL = DrawnTool(
+    "box", (0.0, 0.0, 1.0), (0.0, 0.0, 0.5), (0.0, 0.5, 1.0), (0.0, 0.0, -1.0), (0, 0, 0), (-1, -1, 0)
+)
 PRESSED = dataclasses.replace(HELLO, holds=False, line=None, fields=(FIELD,), radius_parameter=1, tool=TOOL)
 SHOWN = Shown(PROTOCOL, "block", (FIELD,), (StepInfo("sample 3", {"energy": "1 mJ"}),), 0.01, TOOL)
 NEWS = Recording(active=True, file="rod.trace", seconds=3.5, size=4e5, lost=0, problem="")

@@ -318,7 +318,9 @@ def _read_scan(path: Path, labels: dict[str, int], options: PartOptions) -> tupl
     """Return no unit, which a scan states, and the faces of its tissues."""
     if options.unit is not None:
         raise UsageError(f"{path} is a scan and states its lengths.", fix="Leave --unit out.")
-    element = None if options.element in {None, AUTO} else parse_quantity(str(options.element), "m", "--element")
+    element = (
+        None if options.element in {None, AUTO} else parse_quantity(str(options.element), "m", "--element")
+    )
     return None, part_shape(str(path), element=element, labels=labels, up=options.up).faces
 
 

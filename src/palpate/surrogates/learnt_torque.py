@@ -74,11 +74,11 @@ class TorqueEvaluator:
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray, force: np.ndarray) -> None:
         """Renew the torque at a place (3,) in m and further inputs (p,), where the tool feels a force (3,) in N."""
-        self._kernel(position, parameters, force, self._ends, self._x, self.torque, *self._network)
+        self._kernel(position, parameters, force, self._ends, self._x, self.torque, self._network)
 
 
 @kernel
-def torque_into(position, parameters, force, ends, x, torque, work, steps, layout, scales, units, rows, modes, constants):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201, E501
+def torque_into(position, parameters, force, ends, x, torque, net) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill ‖F‖ a (3,) at a place (3,) and further inputs (p,), each within its `ends` (2, n); x (n,) is scratch."""
     size = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
     if size == 0.0:
@@ -88,7 +88,7 @@ def torque_into(position, parameters, force, ends, x, torque, work, steps, layou
     for i in range(len(x)):
         value = position[i] if i < 3 else parameters[i - 3]
         x[i] = min(max(value, ends[0, i]), ends[1, i])
-    point_into(x, torque, work, steps, layout, scales, units, rows, modes, constants)
+    point_into(x, torque, *net)
     for i in range(3):
         torque[i] *= size
 

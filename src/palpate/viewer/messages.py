@@ -283,7 +283,7 @@ class DrawnTool:
 
     words: str  # shape and sizes, such as ``capsule of radius 6 mm, 24 mm long``
     centre: Vec3  # (3,) way from the tool's place to its middle, m
-    # (3,) way from the tool's place to the ball whose depth counts, m: a file's core answers with contact points less it
+    # (3,) way from the tool's place to the ball whose depth counts, m: a file's core answers contact points less it
     shift: Vec3
     points: tuple[float, ...]  # x y z of each point from the place, m
     normals: tuple[float, ...]  # outward unit normal of each

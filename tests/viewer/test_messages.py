@@ -37,6 +37,7 @@ from palpate.viewer.part_messages import (
     MaterialInfo,
     PartFacts,
     PartNews,
+    RegionInfo,
     SizeInfo,
     StartWish,
     ToolInfo,
@@ -93,7 +94,15 @@ NEWS = Recording(active=True, file="rod.trace", seconds=3.5, size=4e5, lost=0, p
 REASON = Reason(now="no force", stopped=True, dropped="a bad number", ago=0.25)
 FEEL = Feel(body=900.0, limit=333.0, felt=333.0, override=False, words="softened")
 WISH = StartWish(
-    "", "neo-hookean", "10 kPa", "0.45", "6 mm", "3 mm", tool="capsule", sizes={"radius": "6 mm"}
+    "",
+    "neo-hookean",
+    "10 kPa",
+    "0.45",
+    "6 mm",
+    "3 mm",
+    tool="capsule",
+    sizes={"radius": "6 mm"},
+    regions={"fat": "9 kPa"},
 )
 FACTS = PartFacts(
     file="kidney.stl",
@@ -106,6 +115,7 @@ FACTS = PartFacts(
     laws=("neo-hookean",),
     regions=(),
     tools=(ToolInfo("capsule", "a bar", (SizeInfo("radius", "radius", "6 mm"),)),),
+    regions=(RegionInfo("fat", "5 kPa..30 kPa"),),
     choices=dataclasses.asdict(WISH),
     notes=("repaired",),
 )

@@ -196,3 +196,12 @@ def test_the_torque_of_a_posed_tool_is_the_work_of_every_small_turn(turns):
         upper, lower = energy.energy(moved)
         turn = J[:, :count] @ way
         assert (upper - lower) / (2 * step) == pytest.approx(-torque @ turn, rel=1e-5, abs=1e-9)
+
+
+def test_the_generic_core_knows_tools_in_any_pose():
+    body = tooled.posed_surrogate("axis")
+    block = block_of(body, field=None, with_field=False, deviation=False)
+    low, high = np.array([[r.low, r.high] for r in body.inputs]).T
+    X = np.random.default_rng(0).uniform(low, high, (30, len(low)))
+    torque = body.torque(X)
+    np.testing.assert_allclose(WasmCore.of(block).torques(X), torque, atol=1e-9 * np.abs(torque).max())

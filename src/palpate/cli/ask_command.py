@@ -20,7 +20,7 @@ from palpate.number_text import number_list
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import LearntEnergy, Surrogate
 from palpate.surrogates.fields.node_field import NodeField
-from palpate.surrogates.surrogate import correction_warning
+from palpate.surrogates.training_record import correction_warning
 from palpate.units import Range, parse_quantity
 
 __all__ = ["answers_at", "ask", "deflections", "inputs_of"]

@@ -30,8 +30,8 @@ from palpate.surrogates.fields import line_of
 from palpate.surrogates.learnt_torque import ARM, torque_evaluator
 from palpate.surrogates.memories import Friction, Memory
 from palpate.surrogates.moving_rest import follow
-from palpate.surrogates.surrogate import correction_count, correction_warning
 from palpate.surrogates.tool_friction import with_friction
+from palpate.surrogates.training_record import correction_count, correction_warning
 from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 

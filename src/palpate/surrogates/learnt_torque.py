@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.kernels import for_rows, kernel
 from palpate.network.network_kernels import point_into
 from palpate.surrogates.arguments import rows_of
@@ -49,8 +50,14 @@ def turn_inputs(inputs: Sequence[Range]) -> tuple[int, ...]:
     return tuple(names.index(name) for name in TURNS if name in names)
 
 
-def torques(energy: LearntEnergy, evaluator: Any, X: np.ndarray) -> np.ndarray:
-    """Return τ (N, 3) in N m by an evaluator, at inputs X (N, n) of a tool."""
+def torques(energy: LearntEnergy, evaluator: Any, X: np.ndarray, name: str) -> np.ndarray:
+    """Return τ (N, 3) in N m by an evaluator, at inputs X (N, n) of a tool; a body of that name without is refused."""
+    if evaluator is None:
+        raise UsageError(
+            f"{name!r} tells no torque.",
+            why="It was learnt from solves without one, such as those under a ball.",
+            fix="Sweep under a pp.SurfaceTool, and learn from 20 solves or more.",
+        )
     rows, found = rows_of(X, energy.inputs, "learnt body"), np.zeros((len(X), 3))
     for x, force, torque in zip(rows, energy.force(X), found, strict=True):
         evaluator(x[:3], x[3:], force)
@@ -68,7 +75,7 @@ class TorqueEvaluator:
         self.torque = np.zeros(3)
         self._ends, self._x = np.array(bounds(arm.inputs)), np.zeros(len(arm.inputs))
         self._network = arm.network.compiled()
-        self._kernel = for_rows(torque_into, 1) if few else torque_into
+        self._kernel = for_rows(_torque_into, 1) if few else _torque_into
         self(self._x[:3].copy(), self._x[3:].copy(), np.ones(3))  # compile now, not in the loop
         self.torque[:] = 0.0
 
@@ -78,7 +85,7 @@ class TorqueEvaluator:
 
 
 @kernel
-def torque_into(position, parameters, force, ends, x, torque, net) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _torque_into(position, parameters, force, ends, x, torque, net) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill ‖F‖ a (3,) at a place (3,) and further inputs (p,), each within its `ends` (2, n); x (n,) is scratch."""
     size = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
     if size == 0.0:

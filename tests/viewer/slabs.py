@@ -175,9 +175,9 @@ def slab_under_a_still_tool() -> Surrogate:
     return replace(body, quantities={ARM: LearntQuantities(arm)})
 
 
-def _under(baseline: ToolBaseline, tool: PosedTool, **more: object) -> Surrogate:
+def _under(baseline: ToolBaseline, posed: PosedTool, **more: object) -> Surrogate:
     places = [replace(r, name=f"tip{r.name[1:]}") for r in pressed.INPUTS[:2]]
-    inputs = (*places, Range("tip_z", -pressed.DEEPEST, 0.004, "m"), *tool.angles)
+    inputs = (*places, Range("tip_z", -pressed.DEEPEST, 0.004, "m"), *posed.angles)
     tail = np.append(np.log(pressed.A), np.zeros(len(inputs)))[None]
     energy = LearntEnergy(
         linear_network(list(inputs), [Quantity("ln U/U0")], tail),
@@ -185,7 +185,7 @@ def _under(baseline: ToolBaseline, tool: PosedTool, **more: object) -> Surrogate
         continuation=Continuation.of(inputs, deepest=pressed.DEEPEST),
     )
     plain = _field(pressed.surrogate().hand_energy, 3)
-    growth = np.hstack([plain.network.tail, np.zeros((2, len(tool.angles)))])
+    growth = np.hstack([plain.network.tail, np.zeros((2, len(posed.angles)))])
     shown = replace(
         plain,
         network=linear_network(list(inputs), [Quantity("b0"), Quantity("b1")], growth),

@@ -154,7 +154,7 @@ class PressEnv(_gymnasium.Env):  # type: ignore[misc]
         return np.concatenate(parts).astype(np.float32)
 
     def _info(self) -> dict[str, Any]:
-        """Return force and wanted force, N, depth, m, whether it is trained, and the torque, N m, of a tool that tells it."""
+        """Return force and wanted force, N, depth, m, whether it is trained, and a torque, N m, that is told."""
         told: dict[str, Any] = {}
         if self._torque is not None:
             self._torque(self._place, self._parameters, self._evaluator.force)

@@ -19,8 +19,8 @@ from palpate.learning.loading import load, surrogate_of
 from palpate.number_text import number_list
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import LearntEnergy, Surrogate
-from palpate.surrogates.correction_record import correction_warning
 from palpate.surrogates.fields.node_field import NodeField
+from palpate.surrogates.training_record import correction_warning
 from palpate.units import Range, parse_quantity
 
 __all__ = ["answers_at", "ask", "deflections", "inputs_of"]

@@ -26,12 +26,12 @@ from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import Field, LearntEnergy, LearntQuantities, NodeField, Surrogate, TouchedSurface
 from palpate.surrogates.baselines import PosedBaseline, deepest_ball
-from palpate.surrogates.correction_record import correction_count, correction_warning
 from palpate.surrogates.fields import line_of
 from palpate.surrogates.learnt_torque import ARM, torque_evaluator
 from palpate.surrogates.memories import Friction, Memory
 from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.tool_friction import with_friction
+from palpate.surrogates.training_record import correction_count, correction_warning
 from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 

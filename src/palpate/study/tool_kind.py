@@ -35,6 +35,7 @@ __all__ = [
     "CapsuleShape",
     "ConeShape",
     "CylinderShape",
+    "FileShape",
     "FingertipShape",
     "PunchShape",
     "ShapeRecord",

@@ -203,7 +203,10 @@ class Step(Binary):
 
     index: Annotated[int, Wire("u32", "place in Shown.steps")]
     probed: Annotated[bool, Wire("flag", "a probe touches the body")]
-    centre: Annotated[Vec3, Wire("vec3", "m, of the probe")]
+    centre: Annotated[Vec3, Wire("vec3", "m, of the probe, or a tool's place")]
+    turn: Annotated[
+        Vec3, Wire("vec3", "rad, rotation vector that turns a tool about its place, beside its own")
+    ]
     radius: Annotated[float, Wire("f32", "m, of the probe")]
     displacement: Annotated[np.ndarray, Wire("floats", "m, x y z of each point of the surface")]
     values: Annotated[

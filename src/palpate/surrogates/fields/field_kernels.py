@@ -42,6 +42,7 @@ __all__ = [
     "field_into",
     "moving_into",
     "moving_values",
+    "posed_coefficients_into",
     "profile_arguments",
     "profile_into",
 ]

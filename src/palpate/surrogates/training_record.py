@@ -1,4 +1,4 @@
-"""The record of training and correction in words, of what the file of a learnt body says."""
+"""What the record of a learnt body tells of its training and of measurements that have corrected it."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 
 from palpate.format import share
 
-__all__ = ["correction_count", "correction_warning", "training_words"]
+__all__ = ["correction_count", "correction_warning", "training_in_words"]
 
 
-def training_words(meta: Mapping[str, Any]) -> str:
+def training_in_words(meta: Mapping[str, Any]) -> str:
     """Return in words what the record tells of training and correction."""
     words = ""
     if "solves" in meta:

@@ -211,7 +211,12 @@ def test_the_generic_core_knows_tools_in_any_pose():
 def test_um_bridge_serves_the_torque_without_slopes(body):
     model, x = served_models(body)["torque"], pressed.places(1)[0]
     np.testing.assert_allclose(model.value(x), body.torque(x[None])[0], rtol=1e-12)
-    assert model.support == {"Evaluate": True, "Gradient": False, "ApplyJacobian": False, "ApplyHessian": False}
+    assert model.support == {
+        "Evaluate": True,
+        "Gradient": False,
+        "ApplyJacobian": False,
+        "ApplyHessian": False,
+    }
     assert "torque" not in served_models(pressed.surrogate())
 
 

@@ -9,7 +9,6 @@ import pytest
 
 import palpate as pp
 from palpate.errors import UsageError
-from palpate.network.radial import RADIAL_FUNCTIONS
 from palpate.surrogates import Surrogate
 from surrogates.lumps_made import ROOM, contrast
 from surrogates.touch_made import RADIUS, touch_energy
@@ -48,9 +47,7 @@ def test_a_stiff_lump_adds_and_a_soft_one_takes(body):
     assert (np.diff(stiffer, axis=0) > 0).all()
 
 
-@pytest.mark.parametrize("radial", RADIAL_FUNCTIONS)
-def test_the_body_with_lumps_has_the_energy_and_force_of_the_closed_form(body, radial):
-    body = replace(body, energy=replace(body.energy, network=replace(body.energy.network, radial=radial)))
+def test_the_body_with_lumps_has_the_energy_and_force_of_the_closed_form(body):
     X = _presses()
     X = X[body.energy.inside(X)]
     lumps = [LUMP, pp.Lump((-0.013, 0.012, -0.022), 0.0045, 8.0)]

@@ -197,6 +197,7 @@ def _of_body(body: Surrogate, meta: Mapping[str, Any]) -> dict[str, Any]:
         "inputs": body.inputs,
         "outputs": [
             "energy (J), force (N), stiffness (N/m)",
+            *(["torque (N m) about the tool's place"] if body.torque_evaluator is not None else []),
             *(f"{n} ({f.unit or '1'})" for n, f in body.fields.items()),
         ],
         "inside": str(body.energy),

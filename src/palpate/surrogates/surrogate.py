@@ -37,18 +37,18 @@ from palpate.surrogates.learnt_quantities import LearntQuantities
 from palpate.surrogates.learnt_torque import ARM, torque_evaluator, torques
 from palpate.surrogates.lumps import Lump, LumpContrast
 from palpate.surrogates.lumps.lump_units import energy_with_lumps
-from palpate.surrogates.memories import Memory, Patches
+from palpate.surrogates.memories import Memory
 from palpate.surrogates.memories.friction import MINDLIN
+from palpate.surrogates.memory_places import memory_places
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.surrogates.moving_rest import Followed, follow
 from palpate.surrogates.tool_friction import with_friction
 from palpate.surrogates.training_record import training_in_words
-from palpate.units import Quantity, Range, bounds
+from palpate.units import Quantity, Range
 
 __all__ = ["KIND", "Surrogate"]
 
 _NAMED = 6  # numbers that are named in a line
-_SAMPLES = 4096  # places in the trained ranges, among which a typical press is found
 KIND = "surrogate"  # what the file's header calls it
 # kinds of files of version 0.1.0
 _FORMER = ("touch", "held-body", "touched-body", "touch-surrogate", "grasp-surrogate", "field-surrogate")
@@ -215,14 +215,7 @@ class Surrogate:
         UsageError
             If the body tells none: a ball feels no torque about its centre.
         """
-        evaluator = self.torque_evaluator
-        if evaluator is None:
-            raise UsageError(
-                f"{self.name!r} tells no torque.",
-                why="It was learnt from solves without one, such as those under a ball.",
-                fix="Sweep under a pp.SurfaceTool, and learn from 20 solves or more.",
-            )
-        return torques(self.hand_energy, evaluator, X)
+        return torques(self.hand_energy, self.torque_evaluator, X, self.name)
 
     @property
     def _remembers(self) -> str:
@@ -364,7 +357,8 @@ class Surrogate:
             If the body has no drawn surface to keep a memory on, or the spacing does not fit the memory.
         """
         if memory is not None and spacing is not None:
-            memory = memory.spread(self._patches(spacing), spacing)
+            shown = next(iter(self.surface_fields.values()), None)
+            memory = memory.spread(memory_places(self.hand_energy, shown, spacing), spacing)
         return replace(self, memory=memory)
 
     def with_lumps(self, lumps: Sequence[Lump]) -> Surrogate:
@@ -428,34 +422,6 @@ class Surrogate:
             If the rows have another number of inputs, or the times don't fit.
         """
         return follow(self.hand_energy, self.memory, X, times)
-
-    def _patches(self, spacing: float) -> Patches:
-        """Return places of the touched surface, of the size that a typical press has."""
-        shown, baseline = next(iter(self.surface_fields.values()), None), self.hand_energy.baseline
-        if shown is None or baseline.surface is None:
-            raise UsageError(
-                "This body has no drawn surface to keep a memory on.",
-                why="Places that remember are laid out over the mesh of a field.",
-                fix="Learn it with its shape, or leave `spacing` out.",
-            )
-        corners = shown.triangles
-        if shown.local_mode is not None:
-            corners = corners[shown.touched[corners].all(axis=1)]
-        depth, energy = self._typical_press()
-        own = baseline.radius_input
-        radius = baseline.radius if own is None else (self.inputs[own].low + self.inputs[own].high) / 2.0
-        width = Patches.width_at(radius, depth)
-        return Patches.over(shown.points, corners, spacing, width=width, energy=energy)
-
-    def _typical_press(self) -> tuple[float, float]:
-        """Return half the deepest trained depth, m, and the energy of a press to about there, J."""
-        low, high = bounds(self.inputs)
-        X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
-        X = X[self.hand_energy.inside(X)]
-        s, deepest = self.hand_energy.depth(X), self.hand_energy.going.deepest
-        depth = (deepest if np.isfinite(deepest) else float(s.max())) / 2.0
-        near = int(np.argmin(np.abs(s - depth)))
-        return depth, float(self.hand_energy.energy(X[near : near + 1])[0])
 
     def card(self, file: str | os.PathLike[str] | None = None) -> ModelCard:
         """Return the model card: what it was made from, by whom, its errors, limits and hashes.

@@ -30,7 +30,7 @@ WIDTHS = (
     0.018,
     0.03,
     0.05,
-)  # m, the best is taken: a press is felt over about a contact's width
+)  # m, of which the best is taken: a press is felt over about a contact's width
 REACH = 0.003  # m over which a slope of f is felt beside f: U/F of a press of some mm
 RIDGE = 1e-10  # on squared weights, over the mean square of a unit
 RATIO = 0.02  # share of the largest f below which a place is not about a lump

@@ -37,6 +37,7 @@ from palpate.viewer.part_messages import (
     MaterialInfo,
     PartFacts,
     PartNews,
+    RegionInfo,
     SizeInfo,
     StartWish,
     ToolInfo,
@@ -84,14 +85,24 @@ HELLO = Hello(
     device="",
     meta={"errors": {"rmse": 1e-5}, "seed": 3},
 )
-TOOL = DrawnTool("box", (0.0, 0.0, 1.0), (0.0, 0.0, 0.5), (0.0, 0.5, 1.0), (0.0, 0.0, -1.0), (0, 0, 0), (-1, -1, 0))
+TOOL = DrawnTool(
+    "box", (0.0, 0.0, 1.0), (0.0, 0.0, 0.5), (0.0, 0.5, 1.0), (0.0, 0.0, -1.0), (0, 0, 0), (-1, -1, 0)
+)
 PRESSED = dataclasses.replace(HELLO, holds=False, line=None, fields=(FIELD,), radius_parameter=1, tool=TOOL)
 SHOWN = Shown(PROTOCOL, "block", (FIELD,), (StepInfo("sample 3", {"energy": "1 mJ"}),), 0.01, TOOL)
 NEWS = Recording(active=True, file="rod.trace", seconds=3.5, size=4e5, lost=0, problem="")
 REASON = Reason(now="no force", stopped=True, dropped="a bad number", ago=0.25)
 FEEL = Feel(body=900.0, limit=333.0, felt=333.0, override=False, words="softened")
 WISH = StartWish(
-    "", "neo-hookean", "10 kPa", "0.45", "6 mm", "3 mm", tool="capsule", sizes={"radius": "6 mm"}
+    "",
+    "neo-hookean",
+    "10 kPa",
+    "0.45",
+    "6 mm",
+    "3 mm",
+    tool="capsule",
+    sizes={"radius": "6 mm"},
+    regions={"fat": "9 kPa"},
 )
 FACTS = PartFacts(
     file="kidney.stl",
@@ -102,7 +113,9 @@ FACTS = PartFacts(
     whole=False,
     materials=(MaterialInfo("fat", "soft", "tissue", "3.3 kPa", "0.45"),),
     laws=("neo-hookean",),
+    regions=(),
     tools=(ToolInfo("capsule", "a bar", (SizeInfo("radius", "radius", "6 mm"),)),),
+    regions=(RegionInfo("fat", "5 kPa..30 kPa"),),
     choices=dataclasses.asdict(WISH),
     notes=("repaired",),
 )
@@ -212,7 +225,7 @@ def test_text_that_is_no_message_is_refused(text: str):
 def test_a_frame_of_21_nodes_is_small():
     nothing = dict.fromkeys(("parameters", "coefficients", "indentation"), np.zeros(0))
     frame = dataclasses.replace(sample(Frame), displacement=np.zeros((21, 3)), **nothing)
-    assert len(frame.pack()) < 400
+    assert len(frame.pack()) < 412
 
 
 def test_enumerations_and_kinds_are_distinct():

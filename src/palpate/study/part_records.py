@@ -145,14 +145,16 @@ class PartSurfaceRecord(Record):
 
 
 class PartRecord(Record):
-    """A part from a file: a surface such as STL, CAD such as STEP, a volume mesh such as VTU, or the labelmap of a scan."""
+    """A part from a file: a surface such as STL, CAD such as STEP, a mesh such as VTU, or the labelmap of a scan."""
 
     INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "tool", "pad")
 
     kind: Literal["part"] = "part"
     file: str = Field(min_length=1, description="beside the study file", examples=["part.stl"])
     unit: Literal["m", "dm", "cm", "mm", "um", "in"] | None = Field(
-        None, description="of the file's numbers; STEP and IGES files and scans state their own", examples=["mm"]
+        None,
+        description="of the file's numbers; STEP and IGES files and scans state their own",
+        examples=["mm"],
     )
     element: Metres | None = Field(
         None,

@@ -62,7 +62,10 @@ def rough_study(study: Study) -> Study | None:
     body, acting = study.body, study.interaction
     if not (isinstance(body, PartRecord) and isinstance(study.sweep, PressSweepRecord)):
         return None
-    if part_kind(body.file) in {"mesh", "scan"}:  # other triangles of a scan would not be those that were picked
+    if part_kind(body.file) in {
+        "mesh",
+        "scan",
+    }:  # other triangles of a scan would not be those that were picked
         return None
     size = (
         rough_element(acting.build_tool().shape)

@@ -3,15 +3,15 @@
 Labels are smoothed and sampled on a lattice of the elements' size. Each cube of the lattice that holds two labels has a
 vertex, and each pair of neighbours with different labels four triangles' corners around it (surface nets, Gibson 1998,
 Constrained elastic surface nets, MERL TR99-24). A vertex is then moved to where the smoothed indicators of the cube's
-labels are equal, within its cube; a small addition to each indicator makes the flat triangles enclose its voxels'
-volume.
+labels are equal, within its cube. The terraces of the voxels are smoothed away within half a voxel, and each label gets
+the volume of its voxels again.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,15 @@ __all__ = ["LabelSurface", "label_surface"]
 
 # standard deviation of the smoothing, in voxels against steps, and in the lattice's spacings against gaps of sampling
 SMOOTH_VOXEL, SMOOTH_LATTICE = 0.85, 0.35
-EVEN, EXACT = 8, 8  # rounds that spread the vertices and step back to the surface, and of these steps alone
-MOST_SHIFT = 0.1  # of the lattice's spacing: how far surfaces move in a round to keep a volume
+EVEN, EXACT = 8, 4  # rounds that spread the vertices and step back to the surface, and of these steps alone
 WITHIN = 0.45  # of the lattice's spacing: a vertex stays in its cube, so that surfaces don't cut each other
+FAIR = 2.5  # voxels: waves of about four times this length are halved where terraces are removed
+SHIFTS, MOST_SHIFT = (
+    6,
+    0.1,
+)  # rounds in which volumes are kept, and how far surfaces move in each, in lattice spacings
+FAIR_ROUNDS = 3  # of this, each within half a voxel
+TERRACE = 0.5  # of a voxel: how far a place moves by it
 STEP = 0.05  # of the lattice's spacing, in the difference quotient of an indicator
 FLAT = 1e-3  # change of an indicator along one spacing below which it has no direction
 CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -49,13 +55,21 @@ class LabelSurface:
     inside: np.ndarray
     outside: np.ndarray
 
+    @property
+    def area_vectors(self) -> np.ndarray:
+        """Normal towards `outside` times area of each triangle in m², shape (t, 3)."""
+        a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
+        return np.cross(b - a, c - a) / 2
+
 
 def label_surface(image: LabelImage, spacing: float) -> LabelSurface:
     """Return the surfaces between the labels of an image, with triangles of about `spacing` in m."""
     lattice = _Lattice(image, spacing)
     cells = lattice.cells()
     cube = np.full(np.array(cells.shape) - 1, -1)
-    corner = np.stack([cells[tuple(slice(c, c + n) for c, n in zip(k, cube.shape, strict=True))] for k in CORNERS], -1)
+    corner = np.stack(
+        [cells[tuple(slice(c, c + n) for c, n in zip(k, cube.shape, strict=True))] for k in CORNERS], -1
+    )
     mixed = np.argwhere((corner != corner[..., :1]).any(axis=-1))
     cube[tuple(mixed.T)] = np.arange(len(mixed))
     corner = corner[tuple(mixed.T)]
@@ -84,8 +98,12 @@ class _Lattice:
         self.first = middle - (counts - 1) / 2 * spacing
         part = image.labels[tuple(slice(a, b) for a, b in zip(low, high, strict=True))]
         weights = [
-            _weights(self.first[d] + spacing * np.arange(counts[d]), (low[d] + np.arange(part.shape[d])) * image.spacing[d],
-                     math.hypot(SMOOTH_VOXEL * image.spacing[d], SMOOTH_LATTICE * spacing), image.spacing[d])
+            _weights(
+                self.first[d] + spacing * np.arange(counts[d]),
+                (low[d] + np.arange(part.shape[d])) * image.spacing[d],
+                math.hypot(SMOOTH_VOXEL * image.spacing[d], SMOOTH_LATTICE * spacing),
+                image.spacing[d],
+            )
             for d in range(3)
         ]
         shares = [
@@ -96,15 +114,10 @@ class _Lattice:
         from scipy.ndimage import spline_filter
 
         self.volumes = [volume / spacing**3 for volume in image.volumes.values()]
-        self.bias = np.zeros(len(self.shares))  # added to each share
-        # how fast the difference of two shares changes across a plane between them, along one spacing
-        deviation = math.hypot(SMOOTH_VOXEL * image.spacing.max() / spacing, SMOOTH_LATTICE)
-        self.slope = 2 * (2 - math.sqrt(0.5)) / (math.sqrt(2 * math.pi) * deviation)
         self.splines = [spline_filter(share, order=3) for share in self.shares]
 
     def cells(self) -> np.ndarray:
-        """Return the label with the largest share at each point, (a, b, c) int; edges that are shared by four surfaces
-        are removed."""
+        """Return the label with the largest share at each point, (a, b, c) int."""
         return _thicken(np.asarray(self.shares.argmax(axis=0)))
 
     def at(self, label: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -115,23 +128,10 @@ class _Lattice:
         for number, spline in enumerate(self.splines):
             mine = label == number
             if mine.any():
-                value[mine] = map_coordinates(spline, places[mine].T, order=3, prefilter=False, mode="nearest")
+                value[mine] = map_coordinates(
+                    spline, places[mine].T, order=3, prefilter=False, mode="nearest"
+                )
         return value
-
-    def keep_volumes(self, places: np.ndarray, quads: np.ndarray, sides: np.ndarray) -> None:
-        """Change the additions to the shares so that each label comes nearer to the volume of its voxels.
-
-        The surfaces have corners `quads` (q, 4) at places (n, 3), and the labels (q, 2) on their sides.
-        """
-        a, b, c, d = (places[k] for k in quads.T)
-        area = np.cross(c - a, d - b) / 2
-        flow = np.einsum("qi,qi->q", area, (a + b + c + d) / 4) / 3  # divergence theorem
-        size = np.linalg.norm(area, axis=1)
-        for number, wanted in enumerate(self.volumes, 1):
-            one, other = sides[:, 0] == number, sides[:, 1] == number
-            volume = flow[one].sum() - flow[other].sum()
-            shift = (wanted - volume) / max(size[one | other].sum(), 1e-9)  # in steps of the lattice
-            self.bias[number] += np.clip(shift, -MOST_SHIFT, MOST_SHIFT) * self.slope
 
     def to_metres(self, places: np.ndarray) -> np.ndarray:
         """Return where places (n, 3) in steps of the lattice are, in m."""
@@ -173,7 +173,7 @@ def _thicken(cells: np.ndarray) -> np.ndarray:
 
 
 def _quads(cells: np.ndarray, cube: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners (q, 4) of a quadrilateral between each pair of neighbours that differ, and their labels (q, 2).
+    """Return corners (q, 4) of a quadrilateral between each two neighbours that differ, and their labels (q, 2).
 
     It is counter-clockwise as seen from the second.
     """
@@ -204,11 +204,56 @@ def _settle(
     for k in range(EVEN + EXACT):
         if 0 < k < EVEN:
             places = np.where(is_joined[:, None], (places + mean @ places) / 2, places)
-        if k > 2:
-            lattice.keep_volumes(places, quads, sides)
         for _ in range(2):
             places = places + _newton(lattice, places, present, fresh, count)
             places = np.clip(places, centres - WITHIN, centres + WITHIN)
+    voxel = float(np.prod(lattice.image.spacing)) ** (1 / 3) / lattice.spacing
+    smooth = _without_terraces(places, mean, is_joined, voxel)
+    return _with_volumes(smooth, quads, sides, lattice.volumes)
+
+
+def _without_terraces(places: np.ndarray, mean: Any, is_joined: np.ndarray, voxel: float) -> np.ndarray:
+    """Return places (n, 3) on a surface without the steps of the voxels, of `voxel` in steps of the lattice.
+
+    The surface is the one of least bending that stays near the places, each within half a voxel: a label says no more
+    of where a surface is. Bending, the square of the Laplacian, leaves what is round as it is.
+    """
+    from scipy.sparse import diags_array, eye_array
+    from scipy.sparse.linalg import splu
+
+    bend = diags_array(is_joined.astype(float)) @ (eye_array(len(places)) - mean)
+    solve = splu((eye_array(len(places)) + (FAIR * voxel) ** 4 * bend.T @ bend).tocsc()).solve
+    smooth = places
+    for _ in range(FAIR_ROUNDS):
+        away = solve(smooth) - places
+        far = np.linalg.norm(away, axis=1, keepdims=True)
+        smooth = places + away * np.minimum(1.0, TERRACE * voxel / np.maximum(far, 1e-12))
+    return smooth
+
+
+def _with_volumes(
+    places: np.ndarray, quads: np.ndarray, sides: np.ndarray, volumes: Sequence[float]
+) -> np.ndarray:
+    """Return places (n, 3) moved along the surfaces' normals, so that each label has the volume of its voxels.
+
+    The quadrilaterals (q, 4) have the labels (q, 2) on their sides; volumes are in cubes of the lattice.
+    """
+    for _ in range(SHIFTS):
+        a, b, c, d = (places[k] for k in quads.T)
+        area = np.cross(c - a, d - b) / 2  # towards the second side
+        flow = np.einsum("qi,qi->q", area, (a + b + c + d) / 4) / 3  # divergence theorem
+        size = np.linalg.norm(area, axis=1)
+        shift = np.zeros(len(volumes) + 1)
+        for number, wanted in enumerate(volumes, 1):
+            one, other = sides[:, 0] == number, sides[:, 1] == number
+            missing = wanted - flow[one].sum() + flow[other].sum()
+            shift[number] = missing / max(size[one | other].sum(), 1e-9)
+        move, weight = np.zeros_like(places), np.zeros(len(places))
+        push = area * np.clip(shift[sides[:, 0]] - shift[sides[:, 1]], -MOST_SHIFT, MOST_SHIFT)[:, None]
+        for corner in quads.T:
+            np.add.at(move, corner, push)
+            np.add.at(weight, corner, size)
+        places = places + move / np.maximum(weight, 1e-12)[:, None]
     return places
 
 
@@ -219,9 +264,7 @@ def _neighbour_mean(quads: np.ndarray, count: np.ndarray) -> tuple[Any, np.ndarr
     """
     from scipy.sparse import coo_matrix, diags_array
 
-    edges = np.unique(
-        np.sort(np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1), axis=0
-    )
+    edges = np.unique(np.sort(np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1), axis=0)
     pairs = np.concatenate([edges, edges[:, ::-1]])
     pairs = pairs[count[pairs[:, 1]] >= count[pairs[:, 0]]]
     joined = coo_matrix((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(count),) * 2).tocsr()
@@ -238,16 +281,25 @@ def _newton(
         rows = np.flatnonzero(count == number if number < 4 else count >= 4)
         if not len(rows):
             continue
-        labels = present[rows][fresh[rows]].reshape(len(rows), -1) if number < 4 else np.array(
-            [row[new][:4] for row, new in zip(present[rows], fresh[rows], strict=True)])
+        labels = (
+            present[rows][fresh[rows]].reshape(len(rows), -1)
+            if number < 4
+            else np.array([row[new][:4] for row, new in zip(present[rows], fresh[rows], strict=True)])
+        )
         here = places[rows]
-        share = np.column_stack([lattice.at(label, here) + lattice.bias[label] for label in labels.T])
-        slope = np.stack([
-            np.column_stack([
-                (lattice.at(label, here + STEP * e) - lattice.at(label, here - STEP * e)) / (2 * STEP)
-                for e in np.eye(3)
-            ]) for label in labels.T
-        ], axis=1)
+        share = np.column_stack([lattice.at(label, here) for label in labels.T])
+        slope = np.stack(
+            [
+                np.column_stack(
+                    [
+                        (lattice.at(label, here + STEP * e) - lattice.at(label, here - STEP * e)) / (2 * STEP)
+                        for e in np.eye(3)
+                    ]
+                )
+                for label in labels.T
+            ],
+            axis=1,
+        )
         misfit, jacobian = share[:, 1:] - share[:, :1], slope[:, 1:] - slope[:, :1]
         inverse = np.linalg.pinv(jacobian, rcond=0.1)
         move = -np.einsum("nij,nj->ni", inverse, misfit)

@@ -16,7 +16,13 @@ from palpate.errors import UsageError
 from palpate.file_kinds import SCAN_ENDINGS, part_kind
 from palpate.format import millimetres
 from palpate.physics.apart import mesh_apart, read_apart
-from palpate.physics.shapes.body_file import SurfacePatch, apply_patches, digest_of, require_same, tell_repairs
+from palpate.physics.shapes.body_file import (
+    SurfacePatch,
+    apply_patches,
+    digest_of,
+    require_same,
+    tell_repairs,
+)
 from palpate.physics.shapes.label_surface import LabelSurface, label_surface
 from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volumes, to_ngsolve
 from palpate.physics.shapes.mesh_file import refine_mesh
@@ -25,7 +31,7 @@ from palpate.physics.shapes.naming import require_name
 from palpate.physics.shapes.scan_file import LabelImage, clear_specks, name_labels, read_scan
 from palpate.physics.shapes.shape import Shape, require_size
 
-__all__ = ["CUT_FACE", "UPWARDS", "ImportedScan"]
+__all__ = ["CUT_FACE", "UPWARDS", "ImportedScan", "turn_upwards"]
 
 UPWARDS = {
     "superior": (0.0, 0.0, 1.0),
@@ -43,9 +49,10 @@ CUT_FACE = "cut"
 CUBES = 2000  # of an element's edge that fill the body, where no size is given: seconds a solve
 COARSER = 1.5  # largest element inside over that of the surfaces
 LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
-TELLS = 0.03  # difference of a tissue's volume from that of its voxels, which is told
+TELLS = 0.05  # difference of a tissue's volume from that of its voxels, which is told
 LOST = 0.5  # share of a tissue's volume below which the mesh is refused
 CUT = 0.75  # of an element: nearer to the end of the image, a surface is that of a cut
+STRAIGHT = 0.7  # cosine of the angle to the image's axis within which a triangle faces the end
 
 
 @dataclass(frozen=True)
@@ -185,7 +192,7 @@ def _mesh_scan(
     image = clear_specks(name_labels(path, read_scan(path), labels))
     size = image.labels.shape * image.spacing
     require_size(path, float(size.max()), "mm")
-    turned = _turned(image, up)
+    turned = turn_upwards(image, up)
     volume = sum(image.volumes.values())
     spacing = element or float(f"{(volume / CUBES) ** (1 / 3):.2g}")
     require_budget([(volume, spacing)], [])
@@ -193,10 +200,10 @@ def _mesh_scan(
     points, tetrahedra, region = _fill(path, surface, spacing)
     # the numbers of regions that the mesh has are those of the labels, from 1
     mesh = _body(turned, surface, points, tetrahedra, region, spacing)
-    return mesh, (*image.notes, *_told(path, image, mesh, spacing))
+    return mesh, (*image.notes, *_told(path, image, surface, mesh, spacing))
 
 
-def _turned(image: LabelImage, up: str) -> LabelImage:
+def turn_upwards(image: LabelImage, up: str) -> LabelImage:
     """Return the image in coordinates whose z is a direction of the patient."""
     if up == "superior":
         return image
@@ -248,12 +255,14 @@ def _body(
     order = np.argsort(region, kind="stable")
     tetrahedra, region = tetrahedra[order], region[order] - 1
     outer = outer_faces(tetrahedra)
-    key = {tuple(row): int(k) for row, k in zip(
-        np.sort(surface.triangles, axis=1).tolist(), surface.inside, strict=True)}
+    key = {
+        tuple(row): int(k)
+        for row, k in zip(np.sort(surface.triangles, axis=1).tolist(), surface.inside, strict=True)
+    }
     behind = np.array([key.get(tuple(row), 0) for row in np.sort(outer, axis=1).tolist()])
     names = list(image.names)
     present = [k for k in range(len(names)) if (region == k).any()]
-    index = np.where(_on_cut(image, points[outer].mean(axis=1), spacing), len(names), behind - 1)
+    index = np.where(_on_cut(image, points[outer], spacing), len(names), behind - 1)
     every = [*(f"{name} surface" for name in names), CUT_FACE]
     used, surface_of = np.unique(index, return_inverse=True)
     return BodyMesh(
@@ -267,19 +276,25 @@ def _body(
     )
 
 
-def _on_cut(image: LabelImage, places: np.ndarray, spacing: float) -> np.ndarray:
-    """Return which places (n, 3) in m lie at the end of the image."""
-    along = (places - image.origin) @ np.linalg.inv(image.axes).T / image.spacing + 0.5  # voxels from its corner
+def _on_cut(image: LabelImage, corners: np.ndarray, spacing: float) -> np.ndarray:
+    """Return which triangles (t, 3, 3) in m lie at an end of the image and face it."""
+    back = np.linalg.inv(image.axes).T
+    along = (corners.mean(axis=1) - image.origin) @ back / image.spacing + 0.5  # voxels from its corner
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = across @ back / np.linalg.norm(across, axis=1)[:, None]
     near = CUT * spacing / image.spacing
-    return np.asarray(((along < near) | (along > image.labels.shape - near)).any(axis=1))
+    first = (along < near) & (facing < -STRAIGHT)
+    last = (along > image.labels.shape - near) & (facing > STRAIGHT)
+    return np.asarray((first | last).any(axis=1))
 
 
-def _told(path: str, image: LabelImage, mesh: BodyMesh, spacing: float) -> list[str]:
+def _told(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, spacing: float) -> list[str]:
     """Return sentences about what became of each tissue; refuse a mesh that has lost one."""
     told = []
     if CUT_FACE in mesh.surfaces:
         told.append(f"The body reaches the end of the image; its surface there is called {CUT_FACE!r}.")
-    for name, wanted in image.volumes.items():
+    sizes = np.linalg.norm(surface.area_vectors, axis=1)
+    for number, (name, wanted) in enumerate(image.volumes.items(), 1):
         there = mesh.region_volumes.get(name, 0.0)
         said = f"{1e6 * there:.3g} ml of {name} in the mesh, {1e6 * wanted:.3g} ml in the voxels"
         if there < LOST * wanted:
@@ -288,6 +303,14 @@ def _told(path: str, image: LabelImage, mesh: BodyMesh, spacing: float) -> list[
                 why=f"It is too thin: {said}.",
                 fix=f"Choose smaller ones, such as {millimetres(spacing / 2)}, or leave the label out.",
             )
-        if abs(there - wanted) > TELLS * wanted:
-            told.append(f"{said}: elements of {millimetres(spacing)} hold it in part; smaller ones hold more.")
+        around = sizes[(surface.inside == number) | (surface.outside == number)].sum()
+        thick = (
+            2 * wanted / around
+        )  # of a layer; of other shapes about as much as of a layer as thick as they
+        if thick < spacing or abs(there - wanted) > TELLS * wanted:
+            told.append(
+                f"{name} is about {millimetres(thick)} thick, and elements {millimetres(spacing)}: {said}, but layers "
+                f"thinner than an element come out ragged. Elements of {millimetres(0.7 * thick)} keep them, and take "
+                "longer."
+            )
     return told

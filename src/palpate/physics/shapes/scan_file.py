@@ -206,7 +206,10 @@ def name_labels(path: str, image: LabelImage, wanted: dict[str, int]) -> LabelIm
                 fix="Give the numbers that the labelmap has.",
             )
     left = {number: count for number, count in present.items() if number not in wanted.values()}
-    told = [f"{count} voxels of the label {number} have no name and were left out." for number, count in left.items()]
+    told = [
+        f"{count} voxels of the label {number} have no name and were left out."
+        for number, count in left.items()
+    ]
     kept = np.where(np.isin(image.labels, list(wanted.values())), image.labels, 0).astype(np.int32)
     return replace(image, labels=kept, names=wanted).with_notes(*told)
 
@@ -229,13 +232,22 @@ def clear_specks(image: LabelImage) -> LabelImage:
         if small.any():
             unclear |= np.isin(pieces[1:-1, 1:-1, 1:-1], 1 + np.flatnonzero(small))
             what = f"{int(small.sum())} specks of {name!r}" if name else f"{int(small.sum())} pinholes"
-            told.append(f"{what} ({int(sizes[small].sum())} voxels in all) were given to what surrounds them.")
+            told.append(
+                f"{what} ({int(sizes[small].sum())} voxels in all) were given to what surrounds them."
+            )
         islands = np.sort(sizes[~small])[::-1][1:]
         if len(islands):
-            what = f"{name!r} has {len(islands)} islands" if name else f"The body has {len(islands)} holes inside"
+            what = (
+                f"{name!r} has {len(islands)} islands"
+                if name
+                else f"The body has {len(islands)} holes inside"
+            )
             size = f"{int(islands[0])} voxels, {1e9 * voxel * int(islands[0]):.3g} mm³"
-            told.append(f"{what} beside its largest piece, the largest of {size}; they were kept."
-                        if name else f"{what}, the largest of {size}; they were kept.")
+            told.append(
+                f"{what} beside its largest piece, the largest of {size}; they were kept."
+                if name
+                else f"{what}, the largest of {size}; they were kept."
+            )
     if unclear.any():
         nearest = ndimage.distance_transform_edt(
             unclear, sampling=image.spacing, return_distances=False, return_indices=True

@@ -1,0 +1,189 @@
+"""Labelmaps of scans: the mesh lies where the voxels are, keeps their volumes, and is one at interfaces."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import SimpleITK
+
+from palpate.errors import FileFormatError, UsageError
+from palpate.physics import ImportedScan
+from palpate.physics.advice import ModelWarning
+from palpate.physics.shapes.label_surface import label_surface
+from palpate.physics.shapes.labelled_mesh import UPWARDS, turn_upwards
+from palpate.physics.shapes.scan_file import LabelImage, clear_specks, name_labels, read_scan
+from scanned import INNER, OUTER, UP, ball_in_ball, write_labels
+
+NAMES = {"fat": 1, "lump": 2}
+SIDES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+
+
+def turn(angle):
+    """Return a rotation (3, 3) about a skew axis."""
+    x, y, z = np.array([0.36, 0.48, 0.8])
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory):
+    return ImportedScan(ball_in_ball(tmp_path_factory.mktemp("scan") / "balls.nrrd"), NAMES, element=4e-3)
+
+
+class TestMesh:
+    def test_tissues_keep_the_volume_of_their_voxels(self, scan):
+        voxels = clear_specks(name_labels(scan.path, read_scan(scan.path), NAMES)).volumes
+        for name, volume in scan.rest().region_volumes.items():
+            assert volume == pytest.approx(voxels[name], rel=0.03)
+
+    def test_tissues_share_the_nodes_between_them(self, scan):
+        mesh = scan.rest()
+        faces = np.sort(mesh.tetrahedra[:, SIDES].reshape(-1, 3), axis=1)
+        region = np.repeat(mesh.region_of, 4)
+        _, inverse, count = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
+        assert set(count.tolist()) == {1, 2}
+        # the outer surface is closed and belongs to fat alone: what bounds the lump bounds fat, too
+        assert set(region[count[inverse.ravel()] == 1].tolist()) == {mesh.regions.index("fat")}
+        assert mesh.surfaces == ("fat surface",)
+        assert mesh.area_vectors.sum(axis=0) == pytest.approx(0, abs=1e-12)
+
+    def test_the_interface_lies_on_the_ball(self, scan):
+        mesh = scan.rest()
+        both = np.intersect1d(*(mesh.tetrahedra[mesh.region_of == k] for k in (0, 1)))
+        away = np.linalg.norm(mesh.points[both] - [0, 0, 1e-3 * UP], axis=1) - 1e-3 * INNER
+        assert np.sqrt((away**2).mean()) < 0.5e-3  # a quarter of a voxel
+        outer = np.linalg.norm(mesh.points[np.unique(mesh.triangles)], axis=1) - 1e-3 * OUTER
+        assert np.sqrt((outer**2).mean()) < 0.5e-3
+
+    def test_the_same_file_gives_the_same_mesh(self, scan):
+        again = ImportedScan(scan.path, (("fat", 1), ("lump", 2)), 4e-3)
+        assert again == scan
+        assert np.array_equal(again.rest().points, scan.rest().points)
+
+
+class TestPlaces:
+    @pytest.mark.parametrize(
+        ("name", "spacing", "axes"),
+        [
+            ("oblique.nii.gz", (1.5, 2.0, 3.0), turn(0.7)),
+            ("mirrored.mha", (2.0, 2.0, 2.0), np.diag([1.0, -1.0, 1.0])),
+            ("swapped.nrrd", (2.0, 1.5, 2.5), np.eye(3)[[2, 0, 1]]),
+        ],
+    )
+    def test_anisotropic_and_oblique_voxels_lie_where_their_header_says(self, tmp_path, name, spacing, axes):
+        path = str(ball_in_ball(tmp_path / name, spacing, axes))
+        surface = label_surface(name_labels(path, read_scan(path), NAMES), 2.5e-3)
+        corners = surface.points[surface.triangles]
+        flow = np.einsum("ti,ti->t", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) / 6
+        for number, radius, centre in ((1, OUTER, 0.0), (2, INNER, UP)):
+            mine = surface.outside == 0 if number == 1 else (surface.inside == 2) | (surface.outside == 2)
+            sign = np.where(surface.inside[mine] == number, 1.0, -1.0)
+            volume = (flow[mine] * sign).sum()  # positive: triangles face outwards
+            assert volume == pytest.approx(4 / 3 * np.pi * (1e-3 * radius) ** 3, rel=0.03)
+            middle = (corners[mine].mean(axis=1) * (flow[mine] * sign)[:, None]).sum(axis=0) * 0.75 / volume
+            assert middle == pytest.approx([0, 0, 1e-3 * centre], abs=0.3e-3)
+
+    def test_any_direction_of_the_patient_can_point_up(self, scan):
+        for up, direction in UPWARDS.items():
+            image = LabelImage(
+                np.ones((2, 2, 2), int), np.ones(3), np.eye(3), np.array(direction), {"all": 1}
+            )
+            turned = turn_upwards(image, up)
+            assert turned.origin == pytest.approx([0, 0, 1])
+            assert turned.axes.T @ turned.axes == pytest.approx(np.eye(3))
+            assert np.linalg.det(turned.axes) == pytest.approx(1)
+
+
+class TestRepairs:
+    def image(self, labels, names=NAMES):
+        return LabelImage(np.asarray(labels), np.full(3, 1e-3), np.eye(3), np.zeros(3), names)
+
+    def test_specks_and_pinholes_take_what_surrounds_them_and_are_told(self):
+        labels = np.zeros((12, 12, 12), int)
+        labels[2:10, 2:10, 2:10] = 1
+        whole = labels.copy()
+        labels[5, 5, 5], labels[0, 0, 0], labels[7, 7, 7] = 0, 1, 2
+        labels[3:5, 3:5, 3:6] = 2
+        whole[3:5, 3:5, 3:6] = 2
+        cleared = clear_specks(self.image(labels))
+        assert np.array_equal(cleared.labels, whole)
+        assert [note.partition("(")[0] for note in cleared.notes] == [
+            "1 specks of 'fat' ",
+            "1 specks of 'lump' ",
+            "1 pinholes ",
+        ]
+
+    def test_islands_and_holes_are_kept_and_told_in_voxels_and_mm(self):
+        labels = np.zeros((16, 12, 12), int)
+        labels[1:11, 1:11, 1:11] = 1
+        labels[13:15, 2:4, 2:5] = 1
+        labels[4:7, 4:7, 4:7] = 0
+        cleared = clear_specks(self.image(labels, {"fat": 1}))
+        assert np.array_equal(cleared.labels, labels)
+        assert "12 voxels, 12 mm³" in cleared.notes[0]
+        assert "27 voxels, 27 mm³" in cleared.notes[1]
+
+    def test_labels_without_a_name_are_left_out_and_told(self, scan):
+        image = name_labels(scan.path, read_scan(scan.path), {"fat": 1})
+        assert set(np.unique(image.labels).tolist()) == {0, 1}
+        assert "label 2" in image.notes[0]
+
+    def test_a_body_that_is_cut_by_the_image_says_where(self, tmp_path):
+        labels = np.zeros((14, 14, 12), np.uint8)
+        labels[2:12, 2:12, :8] = 1
+        path = write_labels(tmp_path / "cut.nrrd", labels, (2, 2, 2))
+        with pytest.warns(ModelWarning, match="end of the image"):
+            mesh = ImportedScan(path, {"fat": 1}, element=4e-3).rest()
+        assert mesh.areas["cut"] == pytest.approx(0.02**2, rel=0.15)
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("labels", "spacing", "words"),
+        [
+            (np.zeros((4, 4, 4), np.uint8), (1, 1, 1), "is empty"),
+            (np.ones((4, 4, 4, 2), np.uint8), (1, 1, 1, 1), "has 4 dimensions"),
+            (np.ones((4, 4), np.uint8), (1, 1), "is a plane"),
+            (np.arange(512, dtype=np.int16).reshape(8, 8, 8), (1, 1, 1), "is no labelmap"),
+            (np.full((4, 4, 4), 0.5, np.float32), (1, 1, 1), "is no labelmap"),
+        ],
+    )
+    def test_what_is_no_labelmap_is_said(self, tmp_path, labels, spacing, words):
+        path = str(write_labels(tmp_path / "scan.nrrd", labels, spacing))
+        with pytest.raises(UsageError, match=words):
+            name_labels(path, read_scan(path), {})
+
+    def test_colours_are_refused(self, tmp_path):
+        image = SimpleITK.GetImageFromArray(np.ones((4, 4, 4, 3), np.uint8), isVector=True)
+        SimpleITK.WriteImage(image, str(tmp_path / "rgb.mha"))
+        with pytest.raises(UsageError, match="3 numbers for each voxel"):
+            read_scan(str(tmp_path / "rgb.mha"))
+
+    def test_an_empty_label_is_named_with_those_that_there_are(self, scan):
+        with pytest.raises(UsageError, match="skin=3 is empty") as error:
+            name_labels(scan.path, read_scan(scan.path), {"fat": 1, "skin": 3})
+        assert "2 (" in error.value.why
+
+    def test_a_file_without_the_size_of_a_voxel_is_refused(self, tmp_path):
+        head = b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4 4 4\nencoding: raw\n\n"
+        (tmp_path / "bare.nrrd").write_bytes(head + bytes(64))
+        with pytest.raises(UsageError, match="does not state the size of its voxels"):
+            read_scan(str(tmp_path / "bare.nrrd"))
+
+    def test_a_damaged_file_is_refused(self, tmp_path, scan):
+        (tmp_path / "short.nrrd").write_bytes(Path(scan.path).read_bytes()[:400])
+        with pytest.raises(FileFormatError, match=r"short\.nrrd"):
+            read_scan(str(tmp_path / "short.nrrd"))
+
+    def test_a_layer_that_the_elements_would_lose_is_refused_by_its_volume(self, tmp_path):
+        labels = np.zeros((40, 40, 40), np.uint8)
+        labels[5:35, 5:35, 5:35] = 2
+        labels[6:34, 6:34, 6:34] = 1
+        path = write_labels(tmp_path / "thin.nrrd", labels)
+        with pytest.raises(UsageError, match="too large for 'lump'") as error:
+            ImportedScan(path, NAMES, element=6e-3).rest()
+        assert "5.05 ml in the voxels" in error.value.why
+
+    def test_two_names_of_one_number_are_refused(self, scan):
+        with pytest.raises(UsageError, match="share a name or a number"):
+            ImportedScan(scan.path, {"fat": 1, "gland": 1})

@@ -349,7 +349,7 @@ class Surrogate:
             `palpate.learning.plastic.learn_indentation`; None for a body that forgets.
         spacing : float, optional
             How far apart the places of the surface are that remember, m, a quarter of the probe's radius for example;
-            without it the memory is kept where it says, by default at one place that travels with the probe.
+            without it the memory is kept where it says, by default at one place that travels with it.
 
         Raises
         ------
@@ -387,24 +387,18 @@ class Surrogate:
     ) -> Surrogate:
         """Return the same body under a tool that sticks and slides, in the loop, on the page and in exports.
 
-        Parameters
-        ----------
-        kinetic : float
-            Coefficient of friction of a tool that slides, a pure number; 0.3 for a dry tool on silicone, 0.05 for a
-            wet one on tissue, 0 for none.
-        static : float, optional
-            The same of a tool at rest, at least the kinetic one, which it is by default.
-        ratio : float
-            Tangential over normal stiffness of the contact while it sticks, in (0, 1]; by default Mindlin's for an
-            incompressible body, 2(1 − ν)/(2 − ν) = 2/3.
+        The coefficients of a tool that slides and of one at rest are pure numbers, such as 0.3 for a dry tool on
+        silicone; the static one is at least the kinetic one, which it is by default. `ratio`, in (0, 1], is the tangential
+        over the normal stiffness while it sticks, by default Mindlin's for ν = ½.
 
         Raises
         ------
         UsageError
             For a negative coefficient, a kinetic one above the static one, or a body that is held.
         """
-        memory = with_friction(self.hand_energy, self.memory, kinetic, static, ratio=ratio)
-        return replace(self, memory=memory)
+        return replace(
+            self, memory=with_friction(self.hand_energy, self.memory, kinetic, static, ratio=ratio)
+        )
 
     def follow(self, X: np.ndarray, times: np.ndarray | None = None) -> Followed:
         """Return what the body answers along a history that begins before anything was done to it.

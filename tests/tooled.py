@@ -15,8 +15,8 @@ import numpy as np
 import pressed
 from models import linear_network
 from palpate.learning.learn_arm import ARM_OUTPUTS
-from palpate.surrogates import Continuation, LearntEnergy, LearntQuantities, Surrogate
-from palpate.surrogates.baselines import ToolBaseline
+from palpate.surrogates import ContactLaw, Continuation, LearntEnergy, LearntQuantities, Surrogate
+from palpate.surrogates.baselines import PosedBaseline, ToolBaseline
 from palpate.surrogates.learnt_torque import ARM, TURNS
 from palpate.tools import Capsule, PosedTool
 from palpate.units import Quantity, Range
@@ -59,3 +59,20 @@ def turned_surrogate(turns: int = 3) -> Surrogate:
     network = linear_network(inputs, [Quantity("ln U/U0")], np.array([[np.log(pressed.A), *slopes]]))
     going = Continuation.of(tuple(inputs), deepest=pressed.DEEPEST)
     return replace(body, energy=LearntEnergy(network, energy.baseline, continuation=going), quantities={})
+
+
+def posed_surrogate(turns: str) -> Surrogate:
+    """A capsule whose axis ("axis") or whole orientation ("full") is an input, on a plane, with a learnt factor."""
+    tool = PosedTool(Capsule(0.006, 0.03), (0.0, 0.0, 0.4), turns=turns, tilt=TILT)  # type: ignore[arg-type]
+    baseline = PosedBaseline(
+        ContactLaw("series", 1e-3), pressed.face(), 0.006, tool=json.dumps(tool.describe(), sort_keys=True)
+    )
+    inputs = [
+        *(Range(f"tip_{axis}", -0.01, 0.01, "m") for axis in "xy"),
+        Range("tip_z", -0.004, 0.002, "m"),
+        *tool.angles,
+    ]
+    slopes = [0.1, -0.05, 0.02, *(TILT * BY_TURN[: len(tool.angles)])]
+    network = linear_network(inputs, [Quantity("ln U/U0")], np.array([[2.0, *slopes]]))
+    going = Continuation.of(tuple(inputs), deepest=0.006)
+    return Surrogate(LearntEnergy(network, baseline, continuation=going), meta={"name": "posed"})

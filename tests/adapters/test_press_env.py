@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pressed
+import tooled
 from palpate.errors import UsageError
 
 gymnasium = pytest.importorskip("gymnasium")
@@ -64,3 +65,16 @@ def test_what_does_not_fit_is_refused_in_words():
         environment(mass=0.0)
     with pytest.raises(UsageError, match="further inputs are none"):
         environment(parameters=[1.0])
+
+
+def test_a_tool_tells_its_torque():
+    body = tooled.surrogate()
+    env = gymnasium.make("palpate/Press-v0", body=body)
+    env.reset(seed=1)
+    for _ in range(40):
+        *_, info = env.step(np.array([0.0, 0.0, -0.5], dtype=np.float32))
+        if info["torque"].any():
+            break
+    place = env.unwrapped._place
+    np.testing.assert_allclose(info["torque"], body.torque(place[None])[0], rtol=1e-9)
+    assert info["torque"].any()

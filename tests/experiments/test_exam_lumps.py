@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from examined import slab
+from examined import plane, slab
 
 import pressed
 from palpate.errors import UsageError
@@ -19,12 +20,11 @@ LUMP = Lump((0.005, -0.004, -0.009), 0.005, 8.0)
 
 
 def surface() -> ExamSurface:
-    t = np.linspace(-0.04, 0.04, 41)
-    x, y = (v.ravel() for v in np.meshgrid(t, t))
-    top = np.stack([x, y, 0.0 * x], axis=1)
-    bottom = top - [0.0, 0.0, 0.03]
-    reachable = np.concatenate([np.abs(top[:, :2]).max(axis=1) < 0.039, np.zeros(len(top), bool)])
-    return ExamSurface(np.concatenate([top, bottom]), np.zeros((0, 3), int), reachable, 0.010, 0.006)
+    """A slab's top that can be pressed up to its border, and its bottom 30 mm below."""
+    top = plane(0.08, 40)
+    reachable = np.abs(top.points[:, :2]).max(axis=1) < 0.039
+    points = np.concatenate([top.points, top.points - [0.0, 0.0, 0.03]])
+    return replace(top, points=points, reachable=np.concatenate([reachable, 0 * reachable > 0]))
 
 
 def test_a_lump_lies_where_it_was_put():

@@ -59,12 +59,14 @@ class Sitting:
         self.process = subprocess.Popen(
             [*command, "--port", "0", *options], cwd=plan.parent, stderr=subprocess.PIPE, text=True
         )
-        urls = {}
+        urls, said = {}, []
         for line in self.process.stderr:
+            said.append(line)
             if known := re.match(r"(participant|control): +(http\S+)", line):
                 urls[known[1]] = known[2]
             if len(urls) == 2:
                 break
+        assert len(urls) == 2, "".join(said)
         self.complaints = []
         self.page, self.control = (self._open(browser, urls[name]) for name in ("participant", "control"))
 
@@ -94,7 +96,10 @@ class Sitting:
                 if answered == trials:
                     time.sleep(0.2)
                     return
-                self._leave("touch")
+                with contextlib.suppress(
+                    Error
+                ):  # on a busy machine a press may come too late: it is tried again
+                    self._leave("touch", 5_000)
                 self.page.mouse.up()
             elif phase == "question":
                 self.page.keyboard.press("2")
@@ -118,8 +123,8 @@ class Sitting:
         self.page.mouse.down()
         self.page.mouse.move(x, y + 0.4 * box["height"], steps=4)
 
-    def _leave(self, phase: str) -> None:
-        self.page.wait_for_selector(f"html:not([data-phase={phase}])", timeout=60_000)
+    def _leave(self, phase: str, most: float = 60_000) -> None:
+        self.page.wait_for_selector(f"html:not([data-phase={phase}])", timeout=most)
 
     def end(self, *, kill: bool = False) -> int:
         if kill:

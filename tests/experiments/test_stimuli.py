@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,10 +12,12 @@ from models import spring_beam
 from palpate.errors import DeviceError, UsageError
 from palpate.experiments import stiffened
 from palpate.experiments.conductor import Conductor
+from palpate.experiments.experiment_plan import Plan
 from palpate.experiments.ready_plans import ready_plan
 from palpate.experiments.sitting import Sitting
 from palpate.experiments.stimuli import Stimuli
 from palpate.experiments.study_folder import Participant, StudyFolder, read_table
+from palpate.runtime.touchable import load_touchable
 from palpate.surrogates import Surrogate
 from pressed import surrogate
 
@@ -208,3 +211,22 @@ def test_bodies_that_are_missing_or_not_enough_are_refused(stage):
     vary = stage.c.plan.vary.model_copy(update={"what": "lump_radius"})
     with pytest.raises(UsageError, match="no input 'lump_radius'"):
         Stimuli(stage.c.plan.model_copy(update={"vary": vary}), stage.tmp, stage.tmp / "stimuli")
+
+
+def test_a_hidden_lump_is_felt_and_one_that_leaves_the_skin_is_refused(stage):
+    body = stage.c.stimuli.bodies["reference"]
+    place = (body.home - (body.radius + 0.02) * body.normal).tolist()
+    text = ready_plan("detection", "lump", ["body.palpate"])
+    text = text.replace("place = [0.0, 0.0, -0.02]", f"place = {place}")
+    plan = Plan.model_validate(tomllib.loads(text))
+    stimuli = Stimuli(plan, stage.tmp, stage.tmp / "lumps")
+    trial = Sitting(plan, "sub-01").next()
+    press = (body.home - 0.5 * body.deepest * body.normal)[None]
+    forces = {}
+    for interval, name in enumerate(trial.bodies, 1):
+        touched = load_touchable(stimuli.felt(trial, interval).file)
+        forces[name] = np.linalg.norm(touched.energy.force(press))
+    assert forces["same"] > 1.02 * forces["reference"]
+    large = plan.model_copy(update={"vary": plan.vary.model_copy(update={"high": 0.03})})
+    with pytest.raises(UsageError, match="leaves the skin"):
+        Stimuli(large, stage.tmp, stage.tmp / "lumps")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
@@ -14,9 +16,8 @@ from palpate.export.onnx_export import export_onnx
 from palpate.learning.pressed_solves import PressedSolves
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.baselines import PosedBaseline, deepest_ball
-from palpate.tools import Capsule, PosedTool, Punch, Sphere
+from palpate.tools import Capsule, PosedTool, Punch, Sphere, left_jacobian
 from palpate.validation import TouchSolves
-from palpate.viewer.page_model import PageModel
 from pressed import DEEPEST, RADIUS
 
 # from the place to the ball's centre, and to where the dataset's mesh has its plane
@@ -72,13 +73,79 @@ def test_a_hand_feels_it_at_the_foremost_point(ball):
 
 @pytest.mark.full
 def test_what_does_not_know_tools_refuses_them(ball, tmp_path):
-    with pytest.raises(UsageError, match="be drawn on a page yet"):
-        PageModel(touchable(ball))
-    for export in (export_c, export_onnx):
-        with pytest.raises(UsageError, match="can't be exported yet"):
-            export(ball, tmp_path / "ball.onnx")
+    with pytest.raises(UsageError, match="tells no torque"):
+        ball.torque(pressed.places(1) - WAY)
     with pytest.raises(UsageError, match="solves of the tool that"):
         pp.validate(ball, under(PosedTool(Capsule(0.006, 0.03))))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Solves with a response to each input."""
+
+    X: np.ndarray
+    force: np.ndarray
+    energy: np.ndarray
+    stiffness: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.X)
+
+
+TURNING = PosedTool(Sphere(RADIUS), turns="axis", tilt=0.3)
+MESH = np.array([0.1, 0.1, 0.0])  # where the dataset's mesh has the plane of `pressed`
+
+
+def turned_response(X: np.ndarray) -> np.ndarray:
+    """Force (N, 3) and Jᵀ T (N, 2) of the ball whose place, its foremost point, turns about its centre."""
+    place, turn = TURNING.pose(X)
+    arm = RADIUS * turn[:, :, 2]
+    force = pressed.force(place + arm - MESH)
+    w = np.column_stack([X[:, 3:], np.zeros(len(X))])
+    along = np.einsum("nij,ni->nj", left_jacobian(w), np.cross(arm, force))
+    return np.column_stack([force, along[:, :2]])
+
+
+def turned_solves(count: int, seed: int) -> Dataset:
+    """Solves of the closed form under a ball that turns, five inputs."""
+    rng = np.random.default_rng(seed)
+    angles = TURNING.spread_angles(rng.random((count, 2)))
+    centres = pressed.places(count, seed=seed)
+    X = np.column_stack([centres + MESH - RADIUS * TURNING.rotations(angles)[:, :, 2], angles])
+    steps = 1e-6 * np.eye(5)
+    slopes = [(turned_response(X + step) - turned_response(X - step)) / 2e-6 for step in steps]
+    gradient = np.stack(slopes, axis=2)
+    low, high = X[:, :3].min(axis=0), X[:, :3].max(axis=0)
+    names = zip(("tip_x", "tip_y", "tip_z"), low.tolist(), high.tolist(), strict=True)
+    inputs = (*(pp.Range(name, a, b, "m") for name, a, b in names), *TURNING.angles)
+    acting = {"type": "SurfaceTool", "touches": "top", "depth": (0.0, DEEPEST), **TURNING.describe()}
+    symmetric = (gradient + gradient.swapaxes(1, 2)) / 2
+    rows = Rows(X, turned_response(X), pressed.energy(centres), symmetric)
+    return pressed.dataset(rows, acting=acting, inputs=inputs)
+
+
+@pytest.mark.full
+def test_an_orientation_that_is_an_input_is_learnt_with_its_torque():
+    """Of 60 solves; the response to an angle is the energy's own slope."""
+    energy = pp.learn(turned_solves(60, 1), effort=0.1, shape=False, workers=1)[0].hand_energy
+    unseen = turned_solves(60, 9)
+    X, wanted = unseen.X, unseen.response
+    inside = energy.inside(X)
+    size = np.linalg.norm(wanted[:, :3], axis=1)
+    error = np.linalg.norm(energy.force(X) - wanted[:, :3], axis=1) / size
+    assert np.median(error[inside]) < 0.02
+    steps = 1e-4 * np.eye(5)[3:]
+    slopes = np.array([(energy.energy(X - step) - energy.energy(X + step)) / 2e-4 for step in steps]).T
+    torque = np.linalg.norm(slopes - wanted[:, 3:], axis=1) / (size * RADIUS)
+    assert np.median(torque[inside]) < 0.02
+
+
+@pytest.mark.full
+def test_a_body_under_a_tool_leaves_as_c_and_onnx(ball, tmp_path):
+    for export, name in ((export_c, "ball"), (export_onnx, "ball.onnx")):
+        comparison = export(ball, tmp_path / name).comparison
+        assert comparison is not None
+        assert comparison.passed
 
 
 def test_the_deepest_point_of_a_tilted_tool():

@@ -148,9 +148,10 @@ def test_what_ends_the_force_ends_the_torque_at_once(body, shared, how):
     bench = Bench(body, shared)
     bench.press()
     assert np.linalg.norm(bench.torques[-1]) > 0.5 * MOST
-    wanted, patience = {"not a number": (Fault.IMPOSSIBLE_PLACE, 3), "a jump": (Fault.IMPOSSIBLE_PLACE, 3)}.get(
-        how, (Fault.DEVICE_LOST if how == "gone" else Fault.NONE, 1)
-    )
+    wanted, patience = {
+        "not a number": (Fault.IMPOSSIBLE_PLACE, 3),
+        "a jump": (Fault.IMPOSSIBLE_PLACE, 3),
+    }.get(how, (Fault.DEVICE_LOST if how == "gone" else Fault.NONE, 1))
     if how == "not a number":
         bench.device.sample.orientation[1] = math.nan
     elif how == "a jump":

@@ -16,7 +16,7 @@ from palpate.study.part_choices import chosen_study, shown_part
 from palpate.study.part_study import part_study
 from palpate.study.part_work import rough_study
 from palpate.study.tool_kind import SHAPES
-from palpate.tools import Capsule, PosedTool
+from palpate.tools import Capsule, PosedTool, ScannedTool
 from palpate.tools.tool_sizes import USUAL
 from palpate.viewer.part_messages import StartWish
 from palpate.viewer.shown_part import choices_of
@@ -172,3 +172,27 @@ def test_the_page_proposes_sizes_that_suit_the_part_and_takes_others(part: Path)
 def test_a_misfit_of_a_size_stands_at_its_field(sizes: dict[str, str], field: str, words: str, part: Path):
     shown = shown_part(part_study(part)[0])
     assert words in shown.misfits(wish_for(shown, "punch", **sizes))[field]
+
+
+def test_a_tool_of_a_file_lies_beside_its_study(tmp_path: Path):
+    trimesh.creation.icosphere(subdivisions=2, radius=8.0).export(tmp_path / "ball.stl")
+    study = read(tmp_path, '[interaction.shape]\nkind = "file"\nfile = "ball.stl"\nunit = "mm"\n')
+    shape = study.interaction.build_tool().shape
+    assert isinstance(shape, ScannedTool)
+    assert shape.size == pytest.approx(0.008, rel=0.01)
+    again = tmp_path / "again.toml"
+    again.write_text(to_toml(study), encoding="utf-8")
+    assert read_study(again) == study
+
+
+def test_a_tool_whose_file_is_missing_is_refused(tmp_path: Path):
+    with pytest.raises(UsageError, match=r"ball\.stl"):
+        read(tmp_path, '[interaction.shape]\nkind = "file"\nfile = "ball.stl"\nunit = "mm"\n')
+
+
+def test_friction_of_a_study_is_a_pair_in_order_and_of_a_tool(tmp_path: Path):
+    study = read(tmp_path, "[runtime]\nfriction = 0.3\nstatic_friction = 0.4\n")
+    assert (study.runtime.friction, study.runtime.static_friction) == (0.3, 0.4)
+    for text in ("friction = -0.1", "static_friction = 0.4", "friction = 0.5\nstatic_friction = 0.4"):
+        with pytest.raises(StudyError, match="friction"):
+            read(tmp_path, f"[runtime]\n{text}\n")

@@ -63,6 +63,15 @@ def test_a_mirror_image_of_a_tool_is_the_tool_in_another_pose():
     assert not PosedTool(Capsule(0.006, 0.03)).keeps(over)
 
 
+def test_an_angle_beyond_the_training_is_refused_with_the_one_that_would_do():
+    tool = PosedTool(Capsule(0.006, 0.03), turns="full", tilt=0.4)
+    tool.require_trained(np.array([[0.0, 0.0, 0.0, 0.28, -0.28, -0.4]]))
+    for angles in ([0.3, 0.3, 0.0], [0.0, 0.0, -0.41]):
+        with pytest.raises(UsageError, match=r"trained up to 0.4 rad \(22.9°\)"):
+            tool.require_trained(np.array([[0.0, 0.0, 0.0, *angles]]))
+    PosedTool(Capsule(0.006, 0.03)).require_trained(np.zeros((2, 3)))
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

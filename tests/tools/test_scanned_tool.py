@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +16,12 @@ from palpate.errors import UsageError
 from palpate.physics import Body, SurfaceTool
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block
+from palpate.surrogates import ContactLaw
+from palpate.surrogates.baselines import ToolBaseline, deepest_ball
 from palpate.tools import PosedTool, ScannedTool
+
+sys.path.append(str(Path(__file__).parents[1] / "surrogates"))
+from touch_made import BOX, plane, touch_energy
 
 RADIUS = 8.0  # mm, of files
 
@@ -73,6 +80,18 @@ def test_a_file_of_a_study_keeps_the_tool_itself(ball):
     points = around(ball, 0.007)
     np.testing.assert_array_equal(again.shape.distance(points), ball.distance(points))
     assert len(json.dumps(posed.describe())) < 100_000
+
+
+def test_a_learnt_body_keeps_the_tool_without_its_file(ball, tmp_path):
+    posed = PosedTool(ball, (0.05, 0.0, 0.0))
+    radius, way = deepest_ball(posed, np.array([0.0, 0.0, 1.0]))
+    surface = replace(plane(), frame=plane().frame - np.concatenate([way, np.zeros(len(plane().frame) - 3)]))
+    law = ContactLaw("series", 1e-3)
+    baseline = ToolBaseline(law, surface, radius, tool=json.dumps(posed.describe()))
+    ranges = [pp.Range(f"tip{r.name[1:]}", r.low, r.high, "m") for r in BOX]
+    body = pp.Surrogate(touch_energy(box=ranges, baseline=baseline))
+    again = pp.load(body.save(tmp_path / "body.palpate"))
+    assert again.energy.baseline.posed_tool == posed
 
 
 def test_beyond_the_lattice_the_distance_goes_on(ball):

@@ -16,10 +16,11 @@ from palpate.export.c_export import block_of
 from palpate.export.check_engine import CheckEngine, engine_library
 from palpate.export.fmu_export import export_fmu
 from palpate.export.lib_export import export_lib
+from palpate.export.onnx_export import export_onnx
 from palpate.export.wasm_core import WasmCore
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.learnt_torque import TurnEvaluator, torque_of_slopes
-from palpate.tools.rotations import rotation_matrix
+from palpate.tools.rotations import left_jacobian, rotation_matrix
 
 
 @pytest.fixture(scope="module")
@@ -151,3 +152,56 @@ def test_an_arm_is_learnt_from_mirror_images_too():
     assert learnt is not None
     unseen = pressed.places(40, seed=9)
     np.testing.assert_allclose(learnt.predict(unseen), arms(unseen), atol=2e-5)
+
+
+def test_a_tool_leaves_as_onnx_and_as_functions_of_arrays_with_its_torque(body, tmp_path):
+    pytest.importorskip("onnxruntime")
+    comparison = export_onnx(body, tmp_path / "tool.onnx").comparison
+    assert comparison is not None
+    assert comparison.passed
+    assert comparison.parts["torque"].relative < 1e-9
+
+
+def test_a_tool_is_a_function_of_arrays_with_its_torque(body):
+    jax, X = pytest.importorskip("jax"), pressed.places(20)
+    jax.config.update("jax_enable_x64", True)
+    from palpate.adapters.jax import JaxBody
+
+    np.testing.assert_allclose(np.asarray(JaxBody(body).torque(X)), body.torque(X), rtol=1e-9)
+
+
+@pytest.mark.parametrize("turns", ["axis", "full"])
+def test_a_tool_in_any_pose_leaves_as_c_with_its_torque(turns, tmp_path):
+    comparison = export_c(tooled.posed_surrogate(turns), tmp_path / "c").comparison
+    assert comparison is not None
+    assert comparison.passed
+    assert comparison.parts["torque"].relative < 1e-9
+    assert comparison.parts["force"].relative < 1e-9
+
+
+@pytest.mark.parametrize("turns", ["axis", "full"])
+def test_the_torque_of_a_posed_tool_is_the_work_of_every_small_turn(turns):
+    """dU of a small turn φ about the place is −τ · φ, along every turn that the inputs reach."""
+    body = tooled.posed_surrogate(turns)
+    tool, energy = body.energy.baseline.posed_tool, body.energy
+    count = len(tool.angles)
+    x = np.array([0.002, -0.003, -0.003, 0.1, -0.12, 0.05])[: 3 + count]
+    torque = body.torque(x[None])[0]
+    assert np.linalg.norm(torque) > 0
+    J = left_jacobian(np.append(x[3:], np.zeros(3 - count)))
+    for way in np.eye(count):
+        step = 1e-5
+        moved = np.array([x, x])
+        moved[:, 3:] += step * np.array([way, -way])
+        upper, lower = energy.energy(moved)
+        turn = J[:, :count] @ way
+        assert (upper - lower) / (2 * step) == pytest.approx(-torque @ turn, rel=1e-5, abs=1e-9)
+
+
+def test_the_generic_core_knows_tools_in_any_pose():
+    body = tooled.posed_surrogate("axis")
+    block = block_of(body, field=None, with_field=False, deviation=False)
+    low, high = np.array([[r.low, r.high] for r in body.inputs]).T
+    X = np.random.default_rng(0).uniform(low, high, (30, len(low)))
+    torque = body.torque(X)
+    np.testing.assert_allclose(WasmCore.of(block).torques(X), torque, atol=1e-9 * np.abs(torque).max())

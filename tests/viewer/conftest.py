@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -88,3 +89,18 @@ def keep() -> Callable[[Page, str], None]:
     if (folder := os.environ.get("PALPATE_SCREENSHOTS")) is None:
         return lambda page, name: None
     return lambda page, name: page.screenshot(path=Path(folder) / f"{name}.png") and None
+
+
+@pytest.fixture
+def visit_pressed(browser: Browser, complaints: list[str]) -> Iterator[Callable[[Surrogate], Page]]:
+    """Open the page of a body that is pressed; afterwards there must be no complaint."""
+    with contextlib.ExitStack() as stack:
+
+        def one(body: Surrogate) -> Page:
+            running = stack.enter_context(Viewer(body, port=0))
+            page = open_page(browser, running, complaints, "middle")
+            stack.callback(page.context.close)
+            return page
+
+        yield one
+    assert_no(complaints)

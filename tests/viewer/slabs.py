@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,17 +10,23 @@ import numpy as np
 import pressed
 from models import linear_network
 from palpate.dataset.carried_surface import CarriedSurface, quadratic_triangles, quarter_triangles
+from palpate.learning.learn_arm import ARM_OUTPUTS
 from palpate.surrogates import (
     ContactBaseline,
     ContactLaw,
     Continuation,
     FieldSurrogate,
     LearntEnergy,
+    LearntQuantities,
     Surrogate,
+    TouchedSurface,
 )
+from palpate.surrogates.baselines import PosedBaseline, ToolBaseline, deepest_ball
 from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.surrogates.fields.local_mode import design
+from palpate.surrogates.learnt_torque import ARM
 from palpate.surrogates.memories import Indentation, Relaxation
+from palpate.tools import Capsule, PosedTool
 from palpate.units import Quantity, Range
 
 HALF, HIGH = 0.03, 0.02  # m: 60 × 60 × 20 mm
@@ -140,3 +147,52 @@ def family() -> Surrogate:
         continuation=Continuation.of(inputs, deepest=pressed.DEEPEST),
     )
     return Surrogate(energy, memory=Relaxation(((0.4, 0.05),)), meta={"name": "family"})
+
+
+TILT = 0.35  # rad, to which the tool of `slab_under_a_tool` tilts
+
+
+def slab_under_a_tool() -> Surrogate:
+    """The slab under a capsule that lies along x and tilts about x and y, with its displacement."""
+    tool = PosedTool(Capsule(0.004, 0.02), turns="axis", tilt=TILT)
+    described = json.dumps(tool.describe(), sort_keys=True)
+    baseline = PosedBaseline(ContactLaw("pad"), pressed.face(), tool.shape.size, tool=described)
+    return _under(baseline, tool, tool=described)
+
+
+def slab_under_a_still_tool() -> Surrogate:
+    """The slab under a capsule that is turned by 0.1 rad about y and stays so, with its displacement and its torque."""
+    tool = PosedTool(Capsule(0.004, 0.02), (0.0, 0.1, 0.0))
+    radius, way = deepest_ball(tool, np.array([0.0, 0.0, 1.0]))
+    points, triangles = pressed.CORNERS
+    moved = TouchedSurface.of(points - way, triangles, radius=radius, spacing=0.001)
+    baseline = ToolBaseline(
+        ContactLaw("pad"), moved, radius, tool=json.dumps(tool.describe(), sort_keys=True)
+    )
+    body = _under(baseline, tool, shift=tuple(way.tolist()))
+    slopes = 1e-4 * np.array([[3.0, 1, 4, 2], [-20.0, 1, 5, 9], [2.0, 6, 5, 3]])
+    arm = linear_network(list(body.energy.inputs), list(ARM_OUTPUTS), slopes)
+    return replace(body, quantities={ARM: LearntQuantities(arm)})
+
+
+def _under(baseline: ToolBaseline, posed: PosedTool, **more: object) -> Surrogate:
+    places = [replace(r, name=f"tip{r.name[1:]}") for r in pressed.INPUTS[:2]]
+    inputs = (*places, Range("tip_z", -pressed.DEEPEST, 0.004, "m"), *posed.angles)
+    tail = np.append(np.log(pressed.A), np.zeros(len(inputs)))[None]
+    energy = LearntEnergy(
+        linear_network(list(inputs), [Quantity("ln U/U0")], tail),
+        baseline,
+        continuation=Continuation.of(inputs, deepest=pressed.DEEPEST),
+    )
+    plain = _field(pressed.surrogate().hand_energy, 3)
+    growth = np.hstack([plain.network.tail, np.zeros((2, len(posed.angles)))])
+    shown = replace(
+        plain,
+        network=linear_network(list(inputs), [Quantity("b0"), Quantity("b1")], growth),
+        surface=baseline.touched,
+        radius=baseline.probe_radius,
+        local_mode=replace(plain.local_mode, variation=None),
+        continuation=None,
+        **more,
+    )
+    return Surrogate(energy, fields={"displacement": shown}, meta={"name": "slab"})

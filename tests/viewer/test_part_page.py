@@ -419,3 +419,19 @@ def test_the_page_draws_the_lengths_that_the_server_reads(server, page, study):
         page.fill("#ball-radius", text)
         drawn = float(page.get_attribute("#ball-radius", "data-metres"))
         assert drawn == pytest.approx(read(text), rel=1e-12), text
+
+
+def test_a_tool_is_chosen_for_a_part(server, page, study, chosen, keep):
+    ready(page, server, study)
+    assert page.input_value("#tool") == "ball"
+    page.select_option("#tool", "punch")
+    assert page.is_hidden("#ball-radius")
+    begin(page, size_edge="0.001 mm")
+    assert "Choose one with a radius of at least" in misfit(page, "size-edge")
+    begin(page, size_edge="1 mm", size_radius="70 mm")
+    assert "140 mm across, and the part 40 mm long" in misfit(page, "size-radius")
+    keep(page, "part-tool")
+    begin(page, size_radius="4 mm", size_turn_x="5°", ball_depth="1 mm")
+    page.wait_for_function("() => document.documentElement.dataset.stage === 'working'")
+    assert str(chosen[0].interaction.build_tool()) == "punch of radius 4 mm, edge 1 mm, turned by 5°"
+    assert chosen[0].interaction.depth[1] == 1e-3

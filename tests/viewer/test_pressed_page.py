@@ -59,7 +59,8 @@ def stand_still(page: Page, flag: str) -> dict:
         if now["withheld"]:
             hold_again(page)
             now, times = page.evaluate(READ), set()
-        same = all(now["data"][k] == was["data"][k] for k in ("position", "force", "grabbed", "largest"))
+        names = ("position", "force", "grabbed", "largest")  # the last where there is a field
+        same = all(now["data"].get(k) == was["data"].get(k) for k in names)
         moving = now["data"].get("sinking") == "true" or "stalled" in now["flags"] or flag not in now["flags"]
         times = {*times, float(now["data"]["time"])} if same and not moving else set()
         was = now

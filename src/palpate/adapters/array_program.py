@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import UsageError
-from palpate.export.onnx_body import add_body
+from palpate.export.onnx_body import add_body, add_torque
 from palpate.export.onnx_graph import Graph, Node
 from palpate.surrogates import Surrogate
 
@@ -68,6 +68,7 @@ def program_of(body: Surrogate, dtype: type[np.floating]) -> dict[str, ArrayProg
         )
     graph = Graph(dtype)
     add_body(graph, body.hand_energy, apart=True)
+    add_torque(graph, body)
     names = [node.result for node in graph.nodes if node.kind == "Identity"]
     return {name: _part_for(graph, name, len(body.inputs)) for name in names}
 

@@ -61,6 +61,16 @@ class JaxBody:
         """Return ∂F/∂x (3, 3), N/m; (N, 3, 3) of rows."""
         return self._run("stiffness", x)
 
+    def torque(self, x: Any) -> Any:
+        """Return the torque on the tool about its place, N m, of the shape of `force`.
+
+        Raises
+        ------
+        UsageError
+            If the body was learnt without one, as under a ball.
+        """
+        return self._run("torque", x)
+
     def depth(self, x: Any) -> Any:
         """Return the baseline's own coordinate s, m: a probe's depth, negative without contact; (N,) of rows."""
         return self._run("depth", x)[..., 0]
@@ -82,7 +92,10 @@ class JaxBody:
     def _run(self, name: str, x: Any) -> Any:
         if name not in self._programs:
             raise UsageError(
-                f"The body {self.body.name!r} does not know its {name}.", fix="Learn it with a posterior."
+                f"The body {self.body.name!r} does not know its {name}.",
+                fix="Learn it with a posterior."
+                if name == "deviation"
+                else "Learn it under a pp.SurfaceTool.",
             )
         program = self._programs[name]
         rows = self._jax.numpy.asarray(x, dtype=self.dtype)

@@ -78,6 +78,7 @@ class PressEnv(_gymnasium.Env):  # type: ignore[misc]
                 f"The parameters {parameters} don't fit {learnt.name!r}: its further inputs are {names}."
             )
         self.body, self._mass, self._evaluator = learnt, mass, energy.evaluator()
+        self._torque: Any = learnt.torque_evaluator
         felt = len(energy.baseline.directions)
         self._axes = energy.baseline.directions
         X = energy.trained_rows()
@@ -153,8 +154,12 @@ class PressEnv(_gymnasium.Env):  # type: ignore[misc]
         return np.concatenate(parts).astype(np.float32)
 
     def _info(self) -> dict[str, Any]:
-        """Return force and wanted force, N, the depth, m, and whether the tool is in the trained region."""
-        return {
+        """Return force and wanted force, N, depth, m, whether it is trained, and a torque, N m, that is told."""
+        told: dict[str, Any] = {}
+        if self._torque is not None:
+            self._torque(self._place, self._parameters, self._evaluator.force)
+            told["torque"] = self._torque.torque.copy()
+        return told | {
             "force": self._evaluator.force.copy(),
             "wanted": self.wanted,
             "depth": self._evaluator.depth,

@@ -69,6 +69,16 @@ class TorchBody:
         """Return ∂F/∂x (N, 3, 3), N/m."""
         return self._run("stiffness", x)
 
+    def torque(self, x: Any) -> Any:
+        """Return the torque on the tool about its place, N m, of the shape of `force`.
+
+        Raises
+        ------
+        UsageError
+            If the body was learnt without one, as under a ball.
+        """
+        return self._run("torque", x)
+
     def depth(self, x: Any) -> Any:
         """Return the baseline's own coordinate s (N,), m: a probe's depth, negative without contact."""
         return self._run("depth", x)[:, 0]
@@ -91,7 +101,10 @@ class TorchBody:
         torch = self._torch
         if name not in self._programs:
             raise UsageError(
-                f"The body {self.body.name!r} does not know its {name}.", fix="Learn it with a posterior."
+                f"The body {self.body.name!r} does not know its {name}.",
+                fix="Learn it with a posterior."
+                if name == "deviation"
+                else "Learn it under a pp.SurfaceTool.",
             )
         program = self._programs[name]
         if not torch.is_tensor(x) or x.dtype != self.dtype or x.ndim != 2 or x.shape[1] != program.inputs:

@@ -20,7 +20,7 @@ from palpate.number_text import number_list
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import LearntEnergy, Surrogate
 from palpate.surrogates.fields.node_field import NodeField
-from palpate.surrogates.surrogate import correction_warning
+from palpate.surrogates.training_record import correction_warning
 from palpate.units import Range, parse_quantity
 
 __all__ = ["answers_at", "ask", "deflections", "inputs_of"]
@@ -90,6 +90,8 @@ def inputs_of(asked: Any) -> tuple[Range, ...]:
 def answers_at(body: Surrogate, X: np.ndarray) -> list[Answer]:
     """Return the answers of a body that is pressed or gripped, at inputs X (N, n)."""
     energy: LearntEnergy = body.hand_energy
+    if (tool := getattr(energy.baseline, "posed_tool", None)) is not None:
+        tool.require_trained(X)
     known = energy.deviation(X) if energy.root is not None else np.full(len(X), math.nan)
     forces = energy.force(X)
     # a deviation is of what is like the training, and says nothing beyond it; that nothing is touched is exact

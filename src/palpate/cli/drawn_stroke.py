@@ -116,21 +116,22 @@ def _press(
         if not abs(distance[0]) <= max(depths[-1], surface.spacing):
             raise UsageError(
                 f"No contact at {_place(given)}: it does not lie on the touched surface.",
-                why="--at is the place of contact on the surface, and not where the ball's centre or the tool is, as in `palpate "
-                "ask --at`.",
+                why="--at is the place of contact on the surface, and not where the ball's centre or the tool is, as "
+                "in `palpate ask --at`.",
                 fix=_nearest(hand, surface, given),
             )
         normal = slope[0] / np.linalg.norm(slope[0])
-        centre = own + (hand.radius - distance[0]) * normal
+        lift = hand.radius - distance if hand.tool is None else hand.tool.offset(normal[None])
+        centre = given + lift[0] * normal
     places = centre - depths[:, None] * normal
-    reached = surface.depth(places, hand.radius)
+    reached = hand.depth(_with_middles(hand, places))
     if (
         not (reached > 0.0).all()
         or not (np.diff(reached) > 0.0).all()
         or depths[-1] > surface.inner + hand.radius
     ):
         raise UsageError(
-            f"A stroke of {1e3 * depths[-1]:.3g} mm at {_place(centre + hand.shift - hand.radius * normal)} leaves the surface.",
+            f"A stroke of {1e3 * depths[-1]:.3g} mm at {_place(centre)} leaves the surface.",
             why="The body lets go of a probe that is too deep, or comes nearer to another side.",
             fix=f"Give a smaller --depth; the deepest trained one is {1e3 * hand.deepest:.3g} mm.",
         )

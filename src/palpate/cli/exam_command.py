@@ -125,9 +125,16 @@ def _body(what: str) -> tuple[ExamKind, Surrogate]:
     from palpate.experiments.exam_kinds import KINDS, kind_of_body
     from palpate.learning.loading import load_surrogate
     from palpate.runtime.touchable import touchable
-    from palpate.surrogates.shipped_bodies import shipped_body
+    from palpate.surrogates.baselines import require_ball
+    from palpate.surrogates.shipped_bodies import FOLDER, shipped_body
 
     if what in KINDS:
+        if not (FOLDER / f"{what}.palpate").is_file():
+            raise UsageError(
+                f"The body of {what} is not in this installation.",
+                why="It is learnt from solves that take some minutes.",
+                fix=f"In a clone, python -m benchmarks.shipped_bodies {what} makes it; {_there()}",
+            )
         return KINDS[what], shipped_body(what)
     path = Path(what)
     if path.suffix == ".toml":
@@ -136,13 +143,22 @@ def _body(what: str) -> tuple[ExamKind, Surrogate]:
         checks.one_of("What is examined", what, tuple(KINDS))
     surrogate = load_surrogate(path)
     body = touchable(surrogate)
+    require_ball(body.energy.baseline, "be examined")
     if body.holds or body.surface is None or body.parameters:
         raise UsageError(
             f"{path} can't be examined.",
-            why="An examination presses the surface of a body by a free probe, without further inputs.",
+            why="An examination presses the surface of a body by a free ball, without further inputs.",
             fix="Take a body of `palpate touch`, or breast, prostate or skin.",
         )
     return kind_of_body(path.stem, body), surrogate
+
+
+def _there() -> str:
+    """Return which bodies can be examined at once, in words."""
+    from palpate.surrogates.shipped_bodies import FOLDER
+
+    names = sorted(path.stem for path in FOLDER.glob("*.palpate"))
+    return f"or examine {' or '.join(names)}." if names else "or examine a body of your own."
 
 
 def _learnt_study(path: Path) -> Path:

@@ -371,5 +371,6 @@ def to_html(
     path = file.with_name(f"{file.stem}-page.html") if out is None else out
     done = export_html(thing, path, check=not no_check, overwrite=force)
     if done.left_out:
-        console.say(f"not in the file: {', '.join(done.left_out)} (5 MB are full, or it is on other nodes)")
+        why = "5 MB are full, it is on other nodes, or under a tool that turns"
+        console.say(f"not in the file: {', '.join(done.left_out)} ({why})")
     _print(console, done, [done.file], _NOT_INSTALLED.format("wasmtime", "check"), no_check=no_check)

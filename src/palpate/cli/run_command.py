@@ -19,7 +19,7 @@ from palpate.runtime import LoopProcess
 from palpate.runtime.shared_state import State
 from palpate.runtime.touchable import load_touchable
 from palpate.runtime.warm_up import WarmUp
-from palpate.surrogates.surrogate import correction_warning
+from palpate.surrogates.training_record import correction_warning
 
 __all__ = ["run_loop"]
 

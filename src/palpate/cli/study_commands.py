@@ -319,7 +319,7 @@ def validate_model(
     """
     from palpate.dataset import Dataset
     from palpate.surrogates import Surrogate
-    from palpate.surrogates.surrogate import correction_count
+    from palpate.surrogates.training_record import correction_count
     from palpate.validation import Chapter, validate, write_report
     from palpate.validation.report.body_words import solid_words
 

@@ -187,8 +187,8 @@ class Device(Protocol):
         """Return the latest reading at the tick that began at `now`, s."""
         ...
 
-    def write(self, force: np.ndarray, torque: np.ndarray = NO_TORQUE, /) -> None:
-        """Push on the hand with `force` (3,), N, and turn it by `torque` (3,), N m, until the next call."""
+    def write(self, force: np.ndarray) -> None:
+        """Push on the hand with `force` (3,), N, until the next call."""
         ...
 
     def close(self) -> None:

@@ -109,7 +109,7 @@ class ForceDimensionDevice(Driver):
         self.sample.holding = True
         self.guarded = self.saturations = 0
         self._x, self._y, self._z = c_double(), c_double(), c_double()
-        self._place = byref(self._x), byref(self._y), byref(self._z)
+        self._place: tuple[Any, ...] = byref(self._x), byref(self._y), byref(self._z)
         self._status = Status()
         self._clutch = int(settings.clutch)
         self._position, self._push = self._dhd.dhdGetPosition, self._dhd.dhdSetForce

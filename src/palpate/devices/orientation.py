@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
 __all__ = ["rotation_into"]
 
 
-def rotation_into(rows: Sequence[float], quaternion: np.ndarray) -> None:
+def rotation_into(rows: Iterable[float], quaternion: np.ndarray) -> None:
     """Fill the quaternion (4,) of a rotation given row by row, nine numbers; not-a-number where it is none.
 
     The largest of the four components is found first, so that none is a quotient of small numbers.

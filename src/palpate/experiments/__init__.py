@@ -14,47 +14,20 @@ All of it was tried on simulated observers and scripted participants only.
     exam_score         what was found and missed, false alarms, area, force and time
     exam_report        the score as a page with a map of the body
     exam_page          the page on which a person examines
+    psychometric       functions of the level, their posterior, goodness of fit
+    placement          which level comes next: constant stimuli, staircases, adaptive
+    course             trials of one condition: order, catch trials, counts
+    observers          simulated people             simulation  a course on many of them
+    groups             random effects, equivalence, power
+    experiment_plan    the plan, a TOML file         ready_plans  plans to be filled in
+    outlook            what a plan can show          analysis     what people said
+    sitting            a sitting as a value          study_folder its files
+    stimuli            the bodies that are felt      conductor    leads a live sitting
+    live_sitting       opens all that one needs      experiment_pages, pages/  the two pages
+
+Names are loaded when they are first used: SciPy's distributions cost time that an examination doesn't need.
 """
 
-from palpate.experiments.analysis import Analysis, analyse
-from palpate.experiments.course import Course
-from palpate.experiments.experiment_plan import Plan, read_plan
-from palpate.experiments.groups import (
-    Equivalence,
-    GroupMean,
-    Population,
-    equivalence,
-    group_mean,
-    power_curve,
-)
-from palpate.experiments.observers import Observer
-from palpate.experiments.placement import Adaptive, Constant, Staircase
-from palpate.experiments.psychometric import JND, Answers, Estimate, Goodness, Psychometric
-from palpate.experiments.simulation import Simulated, simulate_course
-from palpate.experiments.stimuli import stiffened
+import lazy_loader
 
-__all__ = [
-    "JND",
-    "Adaptive",
-    "Analysis",
-    "Answers",
-    "Constant",
-    "Course",
-    "Equivalence",
-    "Estimate",
-    "Goodness",
-    "GroupMean",
-    "Observer",
-    "Plan",
-    "Population",
-    "Psychometric",
-    "Simulated",
-    "Staircase",
-    "analyse",
-    "equivalence",
-    "group_mean",
-    "power_curve",
-    "read_plan",
-    "simulate_course",
-    "stiffened",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -85,7 +85,6 @@ class Conductor:
         self._attempt: _Attempt | None = None
         self._felt: Felt | None = None
         self._heard, self._hand, self._held, self._hidden = -np.inf, 0.0, False, False
-        self._before_pause = "ready"
         self._force = self._depth = 0.0
         body = stimuli.bodies["reference"]
         self._target = plan.sitting.depth or 0.5 * body.deepest
@@ -111,6 +110,7 @@ class Conductor:
                 self._hand = float(np.clip(float(message["hand"]), 0.0, 1.0))
                 self._held = bool(message.get("held", False))
             if message.get("agree") is True and self.phase == "consent":
+                self.files.note("The participant agreed to the consent text.", self.sitting.done + 1)
                 self.phase = "ready"
             if message.get("go") is True and self.phase == "ready":
                 self._begin()
@@ -220,9 +220,9 @@ class Conductor:
         body = self.stimuli.bodies["reference"]
         reach = float(np.linalg.norm(state.position)) if body.holds else state.depth
         self._depth = reach if held else 0.0
-        self._blending, self._clamped = bool(state.blending), bool(state.clamped)
+        self._clamped = bool(state.clamped)
 
-    _blending = _clamped = False
+    _clamped = False
 
     def _go_on(self) -> None:
         present = self._clock()
@@ -249,13 +249,18 @@ class Conductor:
             self._finish("That was all. Thank you!")
             return
         self._attempt = _Attempt(trial, self._clock() - self._start, self._wall() - self._clock())
-        self.words, self._until, self.phase = "", 0.0, "between"
+        self._pause()
+
+    def _pause(self) -> None:
+        """Let a time pass that is the same whether the next body is another one or not: its length must not tell."""
+        self.words, self.phase = "", "between"
+        self._until = self._clock() + self.plan.sitting.pause_seconds
 
     def _try_interval(self) -> None:
         """Put the interval's body into the hand while nothing is touched; then record and let touch."""
         attempt = self._attempt
         assert attempt is not None
-        if self._clock() < self._until or self._depth > _TOUCHED:
+        if self._depth > _TOUCHED:
             return
         felt = self.stimuli.felt(attempt.trial, attempt.interval)
         if self._felt is None or felt.file != self._felt.file:
@@ -267,7 +272,7 @@ class Conductor:
         self._felt = felt
         if felt.parameters:
             self.loop.shared.write_command(parameters=felt.parameters)
-        if self._attempt is not attempt or self.loop.read().blending:
+        if self._attempt is not attempt or self.loop.read().blending or self._clock() < self._until:
             return
         path = self.files.recording(attempt.trial.number, attempt.interval)
         self.loop.start_recording(path)
@@ -294,7 +299,7 @@ class Conductor:
         self._stop_recording()
         if attempt.interval < self.plan.intervals:
             attempt.interval += 1
-            self._until, self.phase = self._clock() + self.plan.sitting.pause_seconds, "between"
+            self._pause()
         else:
             attempt.asked, self.phase = self._clock(), "question"
 

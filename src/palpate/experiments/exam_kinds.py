@@ -52,7 +52,7 @@ KINDS = {
     kind.name: kind
     for kind in (
         ExamKind(
-            "breast", "Examination of a breast", (0.010, 0.015, 0.020), (0.004, 0.007), (0.009, 0.014), 4,
+            "breast", "Examination of a breast", (0.010, 0.014, 0.018), (0.004, 0.007), (0.009, 0.014), 4,
             "This is a model of a breast that lies on the chest. " + _HOW,
         ),
         ExamKind(
@@ -60,7 +60,7 @@ KINDS = {
             "This is a model of a prostate under the rectal wall. " + _HOW,
         ),
         ExamKind(
-            "skin", "Examination of skin", (0.005, 0.008, 0.012), (0.0015, 0.003), (0.005, 0.009), 4,
+            "skin", "Examination of skin", (0.006, 0.009, 0.012), (0.003, 0.006), (0.008, 0.013), 4,
             "This is a model of skin, fat and muscle. " + _HOW,
         ),
     )
@@ -86,20 +86,23 @@ def hide_lumps(
 ) -> tuple[Lump, ...]:
     """Return the lumps of an examination, the same for the same seed; one in five examinations has none.
 
-    Sizes, depths and moduli are drawn without putting one back, so that each examination asks of all kinds evenly. The
+    Sizes, depths and moduli are drawn without putting one back; a sort that fits nowhere gives way to the next. The
     lumps lie under the `surface` of the `body` without lumps; where it has `learnt` lumps, only such are hidden.
     """
     rng = np.random.default_rng(seed)
     touched = surface.inner(max(kind.diameters) / 2.0)  # so that a hand can press all around a lump
-    if rng.random() < _NONE or not len(touched) or body.surface is None:
+    areas = surface.areas[touched]
+    if rng.random() < _NONE or body.surface is None or not areas.any():
         return ()
-    shares = surface.areas[touched] / surface.areas[touched].sum()
+    shares = areas / areas.sum()
     _, slope, _ = body.surface.at(surface.points[touched])
     normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
     sorts = _sorts(kind, learnt)
-    order = rng.permutation(len(sorts))[: int(rng.integers(1, kind.most + 1))]
+    wanted = int(rng.integers(1, kind.most + 1))
     lumps: list[Lump] = []
-    for diameter, cover, ratio in (sorts[k] for k in order):
+    for diameter, cover, ratio in (sorts[k] for k in rng.permutation(len(sorts))):
+        if len(lumps) == wanted:
+            break
         for _ in range(_TRIES):
             k = int(rng.choice(len(touched), p=shares))
             below = rng.uniform(*cover) + diameter / 2.0

@@ -61,6 +61,7 @@ logger = logging.getLogger("palpate.viewer")
 
 MOST_PAGES = 8  # pages that are served at a time
 MESSAGES, MESSAGES_AT_ONCE = 10.0, 40.0  # of a page, per second and at once
+_DRAWS = 20  # of lumps for a practice; four in five have some
 _FORMER = 30  # examinations that the page lists
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"  # of a score
 
@@ -211,9 +212,14 @@ class ExamPage(LocalServer):
         self.loop.swap(path)
 
     def _practise(self, _: ExamWish) -> None:
-        lumps: tuple[Lump, ...] = ()
-        while not lumps:  # practice without a lump teaches nothing
-            lumps = self._draw(secrets.randbits(31))
+        drawn = (self._draw(secrets.randbits(31)) for _ in range(_DRAWS))
+        lumps = next(filter(None, drawn), ())  # practice without a lump teaches nothing
+        if not lumps:
+            raise UsageError(
+                "There is no room for a lump in this body.",
+                why="Under the area that can be pressed all lumps would leave it, for their size.",
+                fix="Take a thicker body, or one that was learnt over a larger area.",
+            )
         self._feel(lumps, self._practised)
         self._practice, self._score = Practice(self.kind, self._body, lumps), ""
 

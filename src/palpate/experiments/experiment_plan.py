@@ -21,7 +21,7 @@ from palpate.experiments.placement import Adaptive, Constant, Placement, Stairca
 from palpate.experiments.psychometric import Psychometric
 from palpate.input_files import read_toml
 from palpate.record_complaints import complaints
-from palpate.records import Count, Metres, Newtons, Number, Record
+from palpate.records import Count, Metres, Newtons, Number, Record, Triple
 
 __all__ = [
     "Comparison",
@@ -51,9 +51,9 @@ class Comparison(Record):
 class Varied(Record):
     """What is varied between the intervals of a trial.
 
-    `what` is "force", by whose factor the learnt body is made stiffer or softer, or the name of an input of it. Of
-    discrimination, `low` and `high` are ratios to the reference; of detection they are the input's own values, and
-    `absent` is its value where there is no signal, in case the reference is the same body.
+    `what` is "force", by whose factor the learnt body is made stiffer or softer, the name of an input of it, or "lump":
+    a lump of that radius is hidden in the body. Of discrimination, `low` and `high` are ratios to the reference; of
+    detection they are the radius or the input's own values, and `absent` is the input's value where there is no signal.
     """
 
     what: str = "force"
@@ -61,6 +61,8 @@ class Varied(Record):
     high: Number = 1.8
     count: Count = Field(default=25, ge=2, le=201)
     absent: Number | None = None
+    place: Triple | None = None  # centre of the lump
+    stiffer: Number = Field(default=5.0, gt=0.0)  # the lump's modulus over that of the tissue
 
     @model_validator(mode="after")
     def _in_order(self) -> Varied:
@@ -89,7 +91,9 @@ class SittingRules(Record):
     break_every: Count = Field(default=40, ge=1)  # trials
     break_seconds: Number = Field(default=60.0, ge=0.0)
     interval_seconds: Number = Field(default=3.0, gt=0.0, le=120.0)  # from first contact
-    pause_seconds: Number = Field(default=0.6, ge=0.0, le=30.0)  # between two intervals
+    pause_seconds: Number = Field(
+        default=1.0, ge=0.5, le=30.0
+    )  # before each interval; it hides a change of body
     depth: Metres | None = Field(default=None, gt=0.0)  # guided; by default half of the trained depth
     limit_minutes: Number = Field(default=45.0, gt=0.0)
 
@@ -163,7 +167,9 @@ class Plan(Record):
         if self.question == "discrimination" and not self.vary.low < 1.0 < self.vary.high:
             raise ValueError("of discrimination, vary.low is below 1 and vary.high above: softer and stiffer")
         if self.question == "detection" and self.vary.what == "force":
-            raise ValueError("of detection, vary.what is an input of the body, such as the lump's radius")
+            raise ValueError('of detection, vary.what is "lump" or an input of the body')
+        if self.vary.what == "lump" and (self.question != "detection" or self.vary.place is None):
+            raise ValueError("a lump is for detection, and needs vary.place, its centre in m")
         return self
 
     @property

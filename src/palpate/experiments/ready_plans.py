@@ -143,10 +143,11 @@ def ready_plan(kind: str, name: str, bodies: Sequence[str | Path]) -> str:
 
 def _vary(kind: str) -> str:
     if kind == "detection":
-        text = _VARY.format(
-            what="lump_radius", low=0.003, high=0.012, meaning="least and largest value of the input"
+        text = _VARY.format(what="lump", low=0.003, high=0.012, meaning="least and largest radius, m")
+        return text.replace("# force: the learnt body's force times a ratio; or", "# a hidden lump; or") + (
+            "place = [0.0, 0.0, -0.02]  # m, the lump's centre in the body\n"
+            "stiffer = 5  # its modulus over that of the tissue\n"
         )
-        return text + "absent = 0.0  # value of the input in the body without a lump\n"
     if kind == "odd-one-out":
         return _VARY.format(what="force", low=1.03, high=2.0, meaning="ratios to the reference, above 1")
     return _VARY.format(what="force", low=0.55, high=1.8, meaning="ratios to the reference, about 1")

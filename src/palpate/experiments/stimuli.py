@@ -8,15 +8,16 @@ import shutil
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from palpate.errors import UsageError
+from palpate.experiments.exam_lumps import LEAST_COVER, body_with_lumps, place_of
 from palpate.experiments.experiment_plan import Plan
 from palpate.experiments.sitting import Trial
 from palpate.experiments.study_folder import checksum
 from palpate.files import writing
 from palpate.runtime.touchable import Touchable, load_touchable
 from palpate.surrogates import Surrogate
+from palpate.surrogates.lumps import Lump
 
 __all__ = ["Felt", "Stimuli", "stiffened"]
 
@@ -70,7 +71,7 @@ class Stimuli:
         files = {"reference": plan.reference} | {c.name: c.file for c in plan.comparison}
         self.files = {name: self._kept(_existing(beside / file)) for name, file in files.items()}
         self.bodies: dict[str, Touchable] = {name: load_touchable(file) for name, file in self.files.items()}
-        self._surrogates: dict[str, Any] = {}
+        self._surrogates: dict[str, Surrogate] = {}
         self._check()
 
     def _kept(self, file: Path) -> Path:
@@ -94,6 +95,13 @@ class Stimuli:
                 )
         if self.plan.question == "rating" or what == "force":
             return
+        if what == "lump":
+            for name in (c.name for c in self.plan.comparison):
+                for level in self.plan.levels[[0, -1]]:
+                    self._lumped(
+                        name, self.plan.value(float(level))
+                    )  # one that leaves the body is refused here
+            return
         for name in (c.name for c in self.plan.comparison):
             place = _index(self.bodies[name], what, name)
             known = self.bodies[name].parameters[place]
@@ -116,11 +124,13 @@ class Stimuli:
         varied = name != "reference" and self.plan.question != "rating"
         if vary.what == "force":
             return Felt(self._scaled(name, trial.value) if varied else self.files[name], tuple(parameters))
+        if varied and vary.what == "lump":
+            return Felt(self._lumped(name, trial.value), tuple(parameters))
         if varied:
             place = _index(self.bodies[name], vary.what, name)
             base = 1.0 if self.plan.question == "detection" else parameters[place]
             parameters[place] = base * trial.value
-        elif vary.absent is not None and self.plan.question == "detection":
+        elif vary.what != "lump" and vary.absent is not None and self.plan.question == "detection":
             parameters[_index(self.bodies[name], vary.what, name)] = vary.absent
         return Felt(self.files[name], tuple(parameters))
 
@@ -128,12 +138,31 @@ class Stimuli:
         source = self.files[name]
         file = self.folder / f"{source.stem}-times-{ratio:.9f}.palpate"
         if not file.exists():
+            stiffened(self._surrogate(name), ratio).save(file)
+        return file
+
+    def _lumped(self, name: str, radius: float) -> Path:
+        """Return the file of a body with the plan's lump of a radius (m) in it."""
+        source, vary, body = self.files[name], self.plan.vary, self.bodies[name]
+        assert vary.place is not None
+        lump = Lump(vary.place, radius, vary.stiffer)
+        file = self.folder / f"{source.stem}-lump-{radius:.9f}.palpate"
+        if not file.exists():
+            if (cover := place_of(body, lump).cover) < LEAST_COVER:
+                raise UsageError(
+                    f"A lump of {1e3 * radius:.3g} mm leaves the skin at vary.place.",
+                    why=f"{1e3 * cover:.2g} mm of tissue cover it, and {1e3 * LEAST_COVER:g} mm are needed.",
+                    fix="Put it deeper, or make vary.high smaller.",
+                )
+            body_with_lumps(self._surrogate(name), body, [lump]).save(file)
+        return file
+
+    def _surrogate(self, name: str) -> Surrogate:
+        if name not in self._surrogates:
             from palpate.learning.loading import load_surrogate
 
-            if name not in self._surrogates:
-                self._surrogates[name] = load_surrogate(source)
-            stiffened(self._surrogates[name], ratio).save(file)
-        return file
+            self._surrogates[name] = load_surrogate(self.files[name])
+        return self._surrogates[name]
 
     @property
     def checksums(self) -> dict[str, str]:

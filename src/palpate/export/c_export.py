@@ -15,7 +15,7 @@ from palpate.export.check_points import Comparison, Precision, compare_body
 from palpate.export.check_program import CheckProgram
 from palpate.export.compilers import find_compiler
 from palpate.export.field_tables import chosen_field
-from palpate.export.weights_block import ARM_NET, PLACES, ROOT, WeightsBlock, identifier
+from palpate.export.weights_block import PLACES, ROOT, WeightsBlock, identifier
 from palpate.files import system_errors, write_file
 from palpate.network import Network
 from palpate.output_files import require_outputs, with_seal
@@ -182,7 +182,7 @@ def compare_c(
             Path(folder),
             memory=bool(block.memory),
             field=nodes,
-            torque=ARM_NET in block.tables,
+            torque=block.torque,
             options=options,
         )
         known = ROOT in block.tables

@@ -87,7 +87,7 @@ def c_files(
         felt, title = len(surrogate.hand_energy.baseline.directions), title.splitlines()[0]
         has = {
             "BODY": True,
-            "TORQUE": ARM_NET in block.tables,
+            "TORQUE": block.torque,
             "MEMORY": block.memory,
             "RELEASE": block.releases,
             "FIELD": block.field,

@@ -246,7 +246,7 @@ def compare_body(
         felt &= ~(np.abs(wanted[:, 1]) < (1e-6 if precision.single else 1e-12))
         rough = np.full(felt.sum(), 1e-2 if precision.single else _DEVIATION)
         parts["deviation"] = difference(wanted[felt, 19:20], got[felt, 19:20], rough)
-    if ARM in surrogate.quantities and hasattr(asker, "torques"):
+    if surrogate.torque_evaluator is not None and hasattr(asker, "torques"):
         parts["torque"] = _torques(surrogate, asker, X[~deep & np.isfinite(X).all(axis=1)], precision)
     parts["flags"] = _flags(energy, X, wanted, got, precision)
     if surrogate.memory is not None:
@@ -258,11 +258,11 @@ def compare_body(
 
 def _torques(surrogate: Surrogate, asker: Any, X: np.ndarray, precision: Precision) -> Difference:
     """Compare the torque on a tool at finite places X (N, n)."""
-    limit = np.minimum(
-        _TIGHT * condition(surrogate.quantities[ARM].network, X)
-        + _TIGHT * condition(surrogate.hand_energy.network, X),
-        _LOOSEST,
-    )
+    if (arm := surrogate.quantities.get(ARM)) is None:  # differences of energies
+        limit = np.full(len(X), _LOOSEST)
+    else:
+        own = condition(arm.network, X) + condition(surrogate.hand_energy.network, X)
+        limit = np.minimum(_TIGHT * own, _LOOSEST)
     limit = np.full(len(X), precision.tolerance) if precision.single else limit
     return difference(surrogate.torque(X), asker.torques(X), limit)
 

@@ -6,11 +6,17 @@ import re
 from collections.abc import Collection, Mapping
 from importlib import resources
 
-from palpate.export.weights_block import ARM_NET, WeightsBlock
+from palpate.export.weights_block import WeightsBlock
 
 __all__ = ["core_file", "core_source", "fill_template", "generic_source"]
 
-_BASELINES = ("contact_baseline.c", "pad_baseline.c", "constant_baseline.c", "overlap_baseline.c")
+_BASELINES = (
+    "contact_baseline.c",
+    "pad_baseline.c",
+    "constant_baseline.c",
+    "overlap_baseline.c",
+    "posed_baseline.c",
+)
 _PART = re.compile(r"@IF (\w+)@\n(.*?)@END@\n", re.DOTALL)
 _MEMORIES = ("relaxation.c", "indentation.c", "iwan_elements.c", "friction.c")
 
@@ -35,7 +41,7 @@ def core_source(block: WeightsBlock) -> str:
             _hooks(block.baseline),
             core_file("energy.c"),
         ]
-        parts += [core_file("torque.c")] if ARM_NET in block.tables else []
+        parts += [core_file("torque.c")] if block.torque else []
     else:
         parts.append(core_file("answers.c"))
     if block.memory:

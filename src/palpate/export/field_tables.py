@@ -108,7 +108,7 @@ def chosen_field(surrogate: Surrogate, name: str | None) -> str | None:
             fix="Name one of these, or leave the field out.",
         )
     if name is None:
-        shown = surrogate.surface_fields
+        shown = {key: field for key, field in surrogate.surface_fields.items() if field.contact is None}
         name = "displacement" if "displacement" in shown else next(iter(shown), None)
     return name
 
@@ -123,6 +123,13 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
         raise UsageError(
             f"The field {name!r} is one at the nodes of a bent body, and the evaluator core knows fields on surfaces.",
             fix="Export the body without a field; its force and energy are the same.",
+        )
+    if shown.contact is not None:
+        raise UsageError(
+            f"The field {name!r} under a tool that turns, or on a curved surface, has no exported form yet.",
+            why="Where it touches follows from all balls of the tool's front, which the evaluator core takes for the "
+            "energy alone.",
+            fix="Export the body without a field; its force, torque and energy are the same.",
         )
     going, mode = shown.continuation, shown.local_mode
     assert going is not None

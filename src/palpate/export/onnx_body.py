@@ -15,28 +15,42 @@ from typing import Any
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.export.onnx_graph import Graph, Value
-from palpate.export.onnx_network import Slopes, network_slopes, regressors
+from palpate.export.onnx_network import Slopes, network_slopes, network_values, regressors
 from palpate.export.onnx_surface import distance_to
-from palpate.surrogates.baselines import Baseline, require_ball
+from palpate.surrogates import Surrogate
+from palpate.surrogates.baselines import Baseline
 from palpate.surrogates.baselines.graph_form import BaselineForm, Distance, Touch, outer
 from palpate.surrogates.energy import LearntEnergy
+from palpate.surrogates.learnt_torque import ARM
+from palpate.units import bounds
 
-__all__ = ["BODY_OUTPUTS", "add_body"]
+__all__ = ["BODY_OUTPUTS", "add_body", "add_torque"]
 
 SLACK = 1e-9  # share of a range: round-off at its edge is still inside, as in the compiled kernels
 STEP = 1e-3  # step over the probe's radius, of the difference for the third derivative of the distance
-BODY_OUTPUTS = ("energy", "force", "stiffness", "amplitude", "slope", "depth", "inside", "deviation")
+BODY_OUTPUTS = (
+    "energy",
+    "force",
+    "stiffness",
+    "amplitude",
+    "slope",
+    "depth",
+    "inside",
+    "deviation",
+    "torque",
+)
 
 
 def add_body(graph: Graph, energy: LearntEnergy, *, apart: bool = False) -> None:
     """Add the input ``x`` (N, n), and the outputs `BODY_OUTPUTS` of an energy, to a graph.
 
-    ``deviation`` is left out where the body has no posterior. Where one output is no number, all are not; kept `apart`,
+    ``deviation`` is left out where the body has no posterior, ``torque`` is that of `add_torque`.
+    Where one output is no number, all are not; kept `apart`,
     each speaks for itself, so that it can be computed without the others.
     """
     baseline, net = energy.baseline, energy.network
-    require_ball(baseline, "be exported")
     n, D = len(energy.inputs), energy.baseline.directions
     k = len(D)
     given = graph.input("x", n)
@@ -68,6 +82,31 @@ def add_body(graph: Graph, energy: LearntEnergy, *, apart: bool = False) -> None
         slopes = _leave(graph, baseline, touch, slopes, place)
     graph.stage = "answers"
     _answers(graph, energy, known, touch, slopes, (X, place), finite, apart)
+
+
+def add_torque(graph: Graph, surrogate: Surrogate) -> None:
+    """Add the output ``torque`` (N, 3), N m, of a tool whose torque was learnt, to the graph of its energy.
+
+    Raises
+    ------
+    UsageError
+        For a tool whose torque is a slope of its energy by its turn, which the graph does not have.
+    """
+    arm = surrogate.quantities.get(ARM)
+    if arm is None:
+        if surrogate.torque_evaluator is not None:
+            raise UsageError(
+                f"The torque of {surrogate.name!r} has no ONNX form.",
+                why="Its tool's orientation is an input: the torque is a slope of its energy, which a graph lacks.",
+                fix="Ask it in Python, or learn the tool in a fixed orientation.",
+            )
+        return
+    graph.stage = "torque"
+    low, high = bounds(arm.inputs)
+    force, X = Value(graph, "force"), Value(graph, "x")
+    inside = graph.minimum(graph.maximum(graph.where(_finite(graph, X), X, low[None]), low), high)
+    size = graph.sqrt((force * force).sum(1))
+    graph.output("torque", size * network_values(graph, arm.network, inside), (3,))
 
 
 def _finite(graph: Graph, X: Value) -> Value:

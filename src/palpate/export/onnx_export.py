@@ -24,7 +24,7 @@ from palpate.export.check_points import (
     Precision,
     compare_body,
 )
-from palpate.export.onnx_body import add_body
+from palpate.export.onnx_body import add_body, add_torque
 from palpate.export.onnx_graph import Graph, require_onnx
 from palpate.export.onnx_network import add_network
 from palpate.export.weights_block import WeightsBlock
@@ -75,6 +75,7 @@ def export_onnx(
     else:
         block = WeightsBlock.of(replace(surrogate, fields={}))
         add_body(graph, surrogate.hand_energy)
+        add_torque(graph, surrogate)
     model = graph.model(surrogate.name, _metadata(surrogate, block))
     comparison = _compare(surrogate, model, Precision(single, tolerance)) if check else None
     if comparison is not None:
@@ -104,6 +105,7 @@ def _metadata(surrogate: Surrogate, block: WeightsBlock) -> dict[str, str]:
         "depth": "m",
         "amplitude": "J^0.5",
         "slope": "J^0.5/m",
+        **({} if surrogate.torque_evaluator is None else {"torque": "N m"}),
     }
     about = "force is that on the hand; inside tells whether it may be trusted, deviation is relative to the force"
     return plain | {"outputs": json.dumps(units), "about": about, "name": surrogate.name}
@@ -163,6 +165,10 @@ class OnnxAsker:
         )
         out[:, 20] = np.where(finite, flags, NOT_A_NUMBER)
         return out
+
+    def torques(self, X: np.ndarray) -> np.ndarray:
+        """Return the torque (N, 3) for each row of X (N, 3 + p)."""
+        return np.asarray(self._session.run(["torque"], {"x": X.astype(self._kind)})[0], np.float64)
 
     def walk(self, X: np.ndarray) -> np.ndarray:
         """Refuse: a graph has no memory."""

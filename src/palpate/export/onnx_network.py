@@ -16,7 +16,7 @@ from palpate.export.onnx_graph import Graph, Value
 from palpate.network import Network, Scaling
 from palpate.network.radial import radial
 
-__all__ = ["Slopes", "add_network", "network_slopes", "regressors"]
+__all__ = ["Slopes", "add_network", "network_slopes", "network_values", "regressors"]
 
 
 @dataclass(frozen=True)
@@ -119,6 +119,12 @@ def _scale_inputs(graph: Graph, scaling: Scaling, X: Value) -> tuple[Any, Value 
     d: Any = graph.maximum(far * b + h, least)
     near = graph.where(d > least, h / d, far * 0.0 + 1.0)
     return far / d, near * (h / d)
+
+
+def network_values(graph: Graph, network: Network, X: Value) -> Value:
+    """Return the outputs (N, m) of a network at inputs X (N, n), not scaled."""
+    row, _ = regressors(graph, network, _scale_inputs(graph, network.scaling, X)[0], 1)
+    return row @ _rows(network)
 
 
 def add_network(graph: Graph, *networks: Network) -> None:

@@ -23,7 +23,7 @@ from palpate.export.core_source import fill_template
 from palpate.export.engine_scene import press_ends, probe_radius, require_touch, shown_mesh, tool_words
 from palpate.export.fmu_binaries import engine_libraries, require_generic
 from palpate.export.package_folder import ExportedPackage, write_package
-from palpate.export.weights_block import ARM_NET, WeightsBlock, identifier
+from palpate.export.weights_block import WeightsBlock, identifier
 from palpate.surrogates import FieldSurrogate, Surrogate
 from palpate.surrogates.model_card import NOT_STATED, card_of
 
@@ -113,7 +113,7 @@ def _package_files(surrogate: Surrogate, name: str, block: WeightsBlock) -> dict
         "@TITLE@": surrogate.name,
         "@RADIUS@": f"{probe_radius(surrogate):.9g}",
         "@HOLDS@": "true" if surrogate.hand_energy.baseline.holds else "false",
-        "@TORQUE@": "true" if ARM_NET in block.tables else "false",
+        "@TORQUE@": "true" if block.torque else "false",
         "@AWAY@": _vector(away),
         "@DEEP@": _vector(deep),
         "@TOOL@": tool_words(surrogate),

@@ -127,6 +127,8 @@ class WeightsBlock:
         C99 of the baseline and of the memory, by these names.
     field : str
         Name of the field whose modes are in; "" for none.
+    torque : bool
+        Whether it tells the torque on a tool: by a learnt arm, or by turns among its inputs.
     """
 
     tables: Mapping[int, Table]
@@ -134,6 +136,7 @@ class WeightsBlock:
     memory: str = ""
     sources: Mapping[str, str] = field(default_factory=dict)
     field: str = ""
+    torque: bool = False
 
     @property
     def label(self) -> str:
@@ -205,7 +208,7 @@ class WeightsBlock:
         if field is not None:
             tables |= field_tables(surrogate, field, tables)
         names = identifier(kind), "" if memory is None else identifier(memory.name)
-        return cls(tables, *names, sources, field or "")
+        return cls(tables, *names, sources, field or "", surrogate.torque_evaluator is not None)
 
     @classmethod
     def of_network(cls, network: Network) -> WeightsBlock:
@@ -312,7 +315,7 @@ def identifier(name: str) -> str:
     return f"_{word}" if word[:1].isdigit() else word
 
 
-_BASELINES = ("contact", "pad", "constant", "overlap")
+_BASELINES = ("contact", "pad", "constant", "overlap", "posed")
 _MEMORIES = ("relaxation", "indentation", "iwan-elements", "friction")
 
 
@@ -395,7 +398,7 @@ def _energy_tables(energy: LearntEnergy, *, deviation: bool) -> dict[int, Table]
 
 
 def _arm_tables(surrogate: Surrogate) -> dict[int, Table]:
-    """Return the network of the torque per newton, where there is one; a torque by turns has no C form yet."""
+    """Return the network of the torque per newton, where there is one."""
     arm = surrogate.quantities.get(ARM)
     if arm is not None:
         own, scales = net_tables(arm.network, 0, 0), net_tables(surrogate.hand_energy.network, 0, 0)[1]
@@ -406,13 +409,7 @@ def _arm_tables(surrogate: Surrogate) -> dict[int, Table]:
                 fix="Learn both from one set of solves, as `palpate.learn` does.",
             )
         return {ARM_NET + i: own[place] for i, place in enumerate((0, 2, 3, 4))}
-    if surrogate.torque_evaluator is None:
-        return {}
-    raise UsageError(
-        f"The torque of {surrogate.name!r} has no exported form.",
-        why="Its tool's orientation is an input: the torque is a slope of its energy, which the core does not take.",
-        fix="Ask it in Python, or learn the tool in a fixed orientation.",
-    )
+    return {}
 
 
 def _points(region: TrainedRegion) -> np.ndarray:

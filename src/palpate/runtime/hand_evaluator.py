@@ -68,13 +68,13 @@ class HandEvaluator:
     under a tool with friction; one more after them is its coefficient. One for a `few` places interprets kernels. Of a
     tool that tells its torque, `torque_at` is as `palpate.surrogates.Surrogate.torque_evaluator` gives it.
 
-    Its answer: `force` (3,), N, on the hand; `torque` (3,), N m, on the tool about its place, zero where none is
-    told; `contact` (3,), m, the probe's centre or the offset of the held place from its rest; `loads` (n,), the inputs of
-    the field at its nodes there, such as loads, N; `inside` the trained region or not; `let_go` where the body has let go of a probe that is still in it; `stiffness`, −F·(∂F/∂x)F/‖F‖², N/m, along
-    the force of the elastic answer, zero without force or where it isn't known; `depth`, m, of the rigid probe in the
-    surface at rest, negative without contact and zero for a probe that was let go or that a released body waits for, or
-    how far the hand has displaced a held body; `indentation` (n,), √J, the amplitude of the print at each place that
-    keeps one.
+    Its answer: `force` (3,), N, on the hand; `torque` (3,), N m, on the tool about its place, zero where none is told;
+    `contact` (3,), m, the probe's centre or the offset of the held place from its rest; `loads` (n,), the inputs of
+    the field at its nodes there, such as loads, N; `inside` the trained region or not; `let_go` where the body has let
+    go of a probe that is still in it; `stiffness`, −F·(∂F/∂x)F/‖F‖², N/m, along the force of the elastic answer, zero
+    without force or where it isn't known; `depth`, m, of the rigid probe in the surface at rest, negative without
+    contact and zero for a probe that was let go or that a released body waits for, or how far the hand has displaced a
+    held body; `indentation` (n,), √J, the amplitude of the print at each place that keeps one.
 
     To be set: `elapsed`, s since the call before, ahead of each call where the body has a memory; `away` (3,), m, where
     a probe or a patch is that nobody holds; `waiting`, that the body was released and waits for a hand that is where it

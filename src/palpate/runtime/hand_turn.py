@@ -148,9 +148,10 @@ class HandTurn:
 class TorqueOnHand:
     """The torque that a device renders: limited, ramped, passive, and zero with the gate closed.
 
-    `torque` (3,), N m in the body's axes, is what is sent. Of a body whose energy changes with the turn, what a hand puts
-    in by one of force and torque may come back by the other: `work` and `way_work`, J, are what it has put in by turns
-    and by ways, and each ledger compares itself with the energy less what went in by the other.
+    `torque` (3,), N m in the body's axes, is what is sent. Of a body whose energy changes with the turn (it `shares`
+    it), what a hand puts in by one of force and torque may come back by the other: `work` and `way_work`, J, are what
+    it has put in by turns and by ways, and each ledger compares itself with the energy less what went in by the
+    other.
     """
 
     def __init__(self, max_torque: float, period: float, scale: float, mass: float, *, shares: bool) -> None:

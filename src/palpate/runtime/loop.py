@@ -475,7 +475,7 @@ class Loop:
             if self.turn_torque is None:
                 self.device.write(self._sent_to_device)
             else:
-                self.device.write(self._sent_to_device, self._turn_sent)
+                self.device.write(self._sent_to_device, self._turn_sent)  # type: ignore[call-arg]  # renders both
         except Exception as error:  # noqa: BLE001 - as for `read`
             if self.turn_torque is not None:
                 self.turn_torque.stop()

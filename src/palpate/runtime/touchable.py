@@ -25,13 +25,13 @@ from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import Field, LearntEnergy, LearntQuantities, NodeField, Surrogate, TouchedSurface
-from palpate.surrogates.baselines import deepest_ball
+from palpate.surrogates.baselines import PosedBaseline, deepest_ball
 from palpate.surrogates.fields import line_of
 from palpate.surrogates.learnt_torque import ARM, torque_evaluator
 from palpate.surrogates.memories import Friction, Memory
 from palpate.surrogates.moving_rest import follow
-from palpate.surrogates.surrogate import correction_count, correction_warning
 from palpate.surrogates.tool_friction import with_friction
+from palpate.surrogates.training_record import correction_count, correction_warning
 from palpate.tools import PosedTool
 from palpate.units import Range, bounds
 
@@ -103,9 +103,10 @@ class Touchable:
     def shift(self) -> np.ndarray:
         """Way (3,) in m from a tool's place to the centre of the ball whose depth counts; zero of a ball.
 
-        `surface` is the body's less this way, so that it takes places.
+        `surface` is the body's less this way, so that it takes places; all of it where a tool turns.
         """
-        return np.zeros(3) if self.tool is None else deepest_ball(self.tool, self.normal)[1]
+        posed = isinstance(self.energy.baseline, PosedBaseline)
+        return np.zeros(3) if self.tool is None or posed else deepest_ball(self.tool, self.normal)[1]
 
     @property
     def holds(self) -> bool:
@@ -215,9 +216,9 @@ class Touchable:
             force = self.energy.force(x[None])[0]
             normal = force / np.linalg.norm(force)
             return x[:3] + self.depth(x[None])[0] * normal, normal
-        distance, slope, _ = self.surface.at(x[None, :3])
+        _, slope, _ = self.surface.at(x[None, :3])
         normal = slope[0] / np.linalg.norm(slope[0])
-        return x[:3] + (self.radius - distance[0]) * normal, normal
+        return x[:3] + self.depth(x[None])[0] * normal, normal
 
     def _nearest_press(self) -> np.ndarray:
         """Return the one of `trained_inputs` that is nearest to the middle of the ranges.

@@ -130,11 +130,11 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
         study = _suit_depth(study)
     study = with_rim(study)
     if options.tool is not None:
-        study = with_tool(study, options)
+        study = _with_tool(study, options)
     return study, tuple(_notes(path, unit, faces, regions, low, high))
 
 
-def with_tool(study: Study, options: PartOptions) -> Study:
+def _with_tool(study: Study, options: PartOptions) -> Study:
     """Return the study of a part under the tool of the options, in place of the ball that suits the part."""
     from palpate.viewer.shown_part import require_room_for_tool, require_round_edge
 

@@ -3,17 +3,30 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
 
 from palpate.errors import UsageError
-from palpate.physics import SurfaceTool
+from palpate.physics import SurfaceTool, read_tool
 from palpate.records import Metres, PadStiffness, Pair, Radians, Record, Triple
 from palpate.study.interaction_records import OnSurface, require_corners, stiffness_or_rigid
 from palpate.study.probe_kind import ProbeLearningRecord, ProbeTestRecord
 from palpate.study.stage_records import SECTIONS, PressSweepRecord, TouchTargetRecord
-from palpate.tools import Box, Capsule, Cone, Cylinder, Fingertip, PosedTool, Punch, Sphere, Tool
+from palpate.tools import (
+    Box,
+    Capsule,
+    Cone,
+    Cylinder,
+    Fingertip,
+    PosedTool,
+    Punch,
+    ScannedTool,
+    Sphere,
+    Tool,
+)
 from palpate.tools.tool_sizes import TURNS, USUAL, sizes_of
 
 __all__ = [
@@ -22,6 +35,7 @@ __all__ = [
     "CapsuleShape",
     "ConeShape",
     "CylinderShape",
+    "FileShape",
     "FingertipShape",
     "PunchShape",
     "ShapeRecord",
@@ -122,8 +136,48 @@ class FingertipShape(ShapeRecord):
     size_z: Metres = _size("fingertip", "size_z", "length along z, in which it presses")
 
 
+class FileShape(ShapeRecord):
+    """A tool of any shape, from the file of its closed surface."""
+
+    tool = ScannedTool
+    kind: Literal["file"] = "file"
+    file: str = Field(
+        min_length=1, description="STL, OBJ, PLY, OFF, GLB or VTP, beside the study", examples=["finger.stl"]
+    )
+    unit: Literal["m", "dm", "cm", "mm", "um", "in"] = Field(
+        description="of the file's coordinates", examples=["mm"]
+    )
+    presses: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+        "-z", description="direction of the file in which it presses"
+    )
+    spacing: Metres | None = Field(
+        None,
+        gt=0,
+        description="distance of the places at which the shape is kept; left out: a sixth of the radius of its end",
+        examples=["0.5 mm"],
+    )
+
+    def build(self) -> Tool:
+        """Return the tool; the file is read once, until it changes."""
+        return _scanned_tool(self, Path(self.file).stat().st_mtime_ns if Path(self.file).is_file() else 0)
+
+
+@lru_cache(maxsize=4)
+def _scanned_tool(record: FileShape, changed: int) -> ScannedTool:
+    """Return the tool of a file that was changed at a time, ns."""
+    del changed
+    return read_tool(record.file, unit=record.unit, presses=record.presses, spacing=record.spacing)
+
+
 ToolShape: TypeAlias = (
-    SphereShape | CapsuleShape | CylinderShape | PunchShape | ConeShape | BoxShape | FingertipShape
+    SphereShape
+    | CapsuleShape
+    | CylinderShape
+    | PunchShape
+    | ConeShape
+    | BoxShape
+    | FingertipShape
+    | FileShape
 )
 SHAPES: dict[str, type[ShapeRecord]] = {
     record.model_fields["kind"].default: record

@@ -15,6 +15,8 @@
     field                what the eye sees of it: displacement, stress, stretch on its surface
     surface              how far a point is from a touched surface
     relaxation, plastic  memory on top of an energy
+    training_record      what a body's record tells of its training, in words
+    shipped_bodies       bodies that come with palpate
     moving_rest          where a body lies that a memory moves; its answer along a history
 """
 

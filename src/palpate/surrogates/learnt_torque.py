@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.kernels import for_rows, kernel
 from palpate.network.network_kernels import point_into
 from palpate.surrogates.arguments import rows_of
@@ -49,8 +50,14 @@ def turn_inputs(inputs: Sequence[Range]) -> tuple[int, ...]:
     return tuple(names.index(name) for name in TURNS if name in names)
 
 
-def torques(energy: LearntEnergy, evaluator: Any, X: np.ndarray) -> np.ndarray:
-    """Return τ (N, 3) in N m by an evaluator, at inputs X (N, n) of a tool."""
+def torques(energy: LearntEnergy, evaluator: Any, X: np.ndarray, name: str) -> np.ndarray:
+    """Return τ (N, 3) in N m by an evaluator, at inputs X (N, n) of a tool; a body of that name without is refused."""
+    if evaluator is None:
+        raise UsageError(
+            f"{name!r} tells no torque.",
+            why="It was learnt from solves without one, such as those under a ball.",
+            fix="Sweep under a pp.SurfaceTool, and learn from 20 solves or more.",
+        )
     rows, found = rows_of(X, energy.inputs, "learnt body"), np.zeros((len(X), 3))
     for x, force, torque in zip(rows, energy.force(X), found, strict=True):
         evaluator(x[:3], x[3:], force)
@@ -68,17 +75,17 @@ class TorqueEvaluator:
         self.torque = np.zeros(3)
         self._ends, self._x = np.array(bounds(arm.inputs)), np.zeros(len(arm.inputs))
         self._network = arm.network.compiled()
-        self._kernel = for_rows(torque_into, 1) if few else torque_into
+        self._kernel = for_rows(_torque_into, 1) if few else _torque_into
         self(self._x[:3].copy(), self._x[3:].copy(), np.ones(3))  # compile now, not in the loop
         self.torque[:] = 0.0
 
     def __call__(self, position: np.ndarray, parameters: np.ndarray, force: np.ndarray) -> None:
         """Renew the torque at a place (3,) in m and further inputs (p,), where the tool feels a force (3,) in N."""
-        self._kernel(position, parameters, force, self._ends, self._x, self.torque, *self._network)
+        self._kernel(position, parameters, force, self._ends, self._x, self.torque, self._network)
 
 
 @kernel
-def torque_into(position, parameters, force, ends, x, torque, work, steps, layout, scales, units, rows, modes, constants):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201, E501
+def _torque_into(position, parameters, force, ends, x, torque, net) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Fill ‖F‖ a (3,) at a place (3,) and further inputs (p,), each within its `ends` (2, n); x (n,) is scratch."""
     size = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
     if size == 0.0:
@@ -88,7 +95,7 @@ def torque_into(position, parameters, force, ends, x, torque, work, steps, layou
     for i in range(len(x)):
         value = position[i] if i < 3 else parameters[i - 3]
         x[i] = min(max(value, ends[0, i]), ends[1, i])
-    point_into(x, torque, work, steps, layout, scales, units, rows, modes, constants)
+    point_into(x, torque, *net)
     for i in range(3):
         torque[i] *= size
 

@@ -174,7 +174,7 @@ def card_of(surrogate: Surrogate, file: str | os.PathLike[str] | None = None) ->
 def _of_body(body: Surrogate, meta: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the card of a learnt body says that no network's does."""
     correction = _record(meta.get("correction"))
-    errors = {
+    errors: dict[str, Any] = {
         "unseen solves": meta.get("validation"),
         "solves left out in turn, relative force error": meta.get("left_out"),
         "corrected body, relative force error": correction.get("force_error"),
@@ -197,6 +197,7 @@ def _of_body(body: Surrogate, meta: Mapping[str, Any]) -> dict[str, Any]:
         "inputs": body.inputs,
         "outputs": [
             "energy (J), force (N), stiffness (N/m)",
+            *(["torque (N m) about the tool's place"] if body.torque_evaluator is not None else []),
             *(f"{n} ({f.unit or '1'})" for n, f in body.fields.items()),
         ],
         "inside": str(body.energy),

@@ -11,7 +11,7 @@ from __future__ import annotations
 import html
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.format import count, millimetres, share
+from palpate.format import count, millimetres
 from palpate.network import Network, load_archive
 from palpate.network.codec import load_value, save_value
 from palpate.page_hook import page_of
@@ -37,17 +37,18 @@ from palpate.surrogates.learnt_quantities import LearntQuantities
 from palpate.surrogates.learnt_torque import ARM, torque_evaluator, torques
 from palpate.surrogates.lumps import Lump, LumpContrast
 from palpate.surrogates.lumps.lump_units import energy_with_lumps
-from palpate.surrogates.memories import Memory, Patches
+from palpate.surrogates.memories import Memory
 from palpate.surrogates.memories.friction import MINDLIN
+from palpate.surrogates.memory_places import memory_places
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.surrogates.moving_rest import Followed, follow
 from palpate.surrogates.tool_friction import with_friction
-from palpate.units import Quantity, Range, bounds
+from palpate.surrogates.training_record import training_in_words
+from palpate.units import Quantity, Range
 
-__all__ = ["KIND", "Surrogate", "correction_count", "correction_warning"]
+__all__ = ["KIND", "Surrogate"]
 
 _NAMED = 6  # numbers that are named in a line
-_SAMPLES = 4096  # places in the trained ranges, among which a typical press is found
 KIND = "surrogate"  # what the file's header calls it
 # kinds of files of version 0.1.0
 _FORMER = ("touch", "held-body", "touched-body", "touch-surrogate", "grasp-surrogate", "field-surrogate")
@@ -142,7 +143,7 @@ class Surrogate:
         return cls(meta=meta, quantities={"outputs": LearntQuantities(learnt)})
 
     def __str__(self) -> str:
-        head = f"Surrogate {self.name!r}: {self.purpose}{_training(self.meta)}{self._remembers}"
+        head = f"Surrogate {self.name!r}: {self.purpose}{training_in_words(self.meta)}{self._remembers}"
         energy = "" if self.energy is None else f"; {self.energy}"
         ranges = f"  {', '.join(str(r) for r in self.inputs)}{energy}"
         parts = [*self.quantities.values(), *self.fields.values()]
@@ -214,14 +215,7 @@ class Surrogate:
         UsageError
             If the body tells none: a ball feels no torque about its centre.
         """
-        evaluator = self.torque_evaluator
-        if evaluator is None:
-            raise UsageError(
-                f"{self.name!r} tells no torque.",
-                why="It was learnt from solves without one, such as those under a ball.",
-                fix="Sweep under a pp.SurfaceTool, and learn from 20 solves or more.",
-            )
-        return torques(self.hand_energy, evaluator, X)
+        return torques(self.hand_energy, self.torque_evaluator, X, self.name)
 
     @property
     def _remembers(self) -> str:
@@ -363,35 +357,29 @@ class Surrogate:
             If the body has no drawn surface to keep a memory on, or the spacing does not fit the memory.
         """
         if memory is not None and spacing is not None:
-            memory = memory.spread(self._patches(spacing), spacing)
+            shown = next(iter(self.surface_fields.values()), None)
+            memory = memory.spread(memory_places(self.hand_energy, shown, spacing), spacing)
         return replace(self, memory=memory)
 
-    def with_lumps(self, lumps: Iterable[Lump]) -> Surrogate:
+    def with_lumps(self, lumps: Sequence[Lump]) -> Surrogate:
         """Return the body with hidden lumps: what a hand feels of it changes, what is drawn and remembered does not.
 
-        The energy of the lumps is added to that of the body, which holds while they are apart. The new body has
-        further units in its network and is evaluated, saved and exported as any other; its file holds the lumps as
-        numbers that whoever opens it can read.
-
-        Parameters
-        ----------
-        lumps : iterable of Lump
-            Balls in the room that ``self.lumps.room`` tells; none for the body without.
+        Their energies add, which holds while they are apart. The new body is evaluated, saved and exported as any
+        other; its file tells whoever opens it where they are. They lie in ``self.lumps.room``.
 
         Raises
         ------
         UsageError
             If the body was not learnt with lumps, or one leaves its room or the skin, or two meet.
         """
-        chosen = tuple(lumps)
         if self.lumps is None:
             raise UsageError(
                 f"{self.name!r} knows nothing of lumps.",
-                why="It was learnt from presses whose strain energy was not looked up.",
+                why="It was learnt from presses in which none were looked up.",
                 fix="Sweep a `palpate.LumpProblem` and learn that.",
             )
-        hidden = [[*lump.place, lump.radius, lump.ratio] for lump in chosen]
-        energy = energy_with_lumps(self.hand_energy, self.lumps, chosen)
+        hidden = [[*lump.place, lump.radius, lump.ratio] for lump in lumps]
+        energy = energy_with_lumps(self.hand_energy, self.lumps, lumps)
         return replace(self, energy=energy, lumps=None, meta={**self.meta, "lumps": hidden})
 
     def with_friction(
@@ -435,34 +423,6 @@ class Surrogate:
         """
         return follow(self.hand_energy, self.memory, X, times)
 
-    def _patches(self, spacing: float) -> Patches:
-        """Return places of the touched surface, of the size that a typical press has."""
-        shown, baseline = next(iter(self.surface_fields.values()), None), self.hand_energy.baseline
-        if shown is None or baseline.surface is None:
-            raise UsageError(
-                "This body has no drawn surface to keep a memory on.",
-                why="Places that remember are laid out over the mesh of a field.",
-                fix="Learn it with its shape, or leave `spacing` out.",
-            )
-        corners = shown.triangles
-        if shown.local_mode is not None:
-            corners = corners[shown.touched[corners].all(axis=1)]
-        depth, energy = self._typical_press()
-        own = baseline.radius_input
-        radius = baseline.radius if own is None else (self.inputs[own].low + self.inputs[own].high) / 2.0
-        width = Patches.width_at(radius, depth)
-        return Patches.over(shown.points, corners, spacing, width=width, energy=energy)
-
-    def _typical_press(self) -> tuple[float, float]:
-        """Return half the deepest trained depth, m, and the energy of a press to about there, J."""
-        low, high = bounds(self.inputs)
-        X = np.random.default_rng(0).uniform(low, high, (_SAMPLES, len(low)))
-        X = X[self.hand_energy.inside(X)]
-        s, deepest = self.hand_energy.depth(X), self.hand_energy.going.deepest
-        depth = (deepest if np.isfinite(deepest) else float(s.max())) / 2.0
-        near = int(np.argmin(np.abs(s - depth)))
-        return depth, float(self.hand_energy.energy(X[near : near + 1])[0])
-
     def card(self, file: str | os.PathLike[str] | None = None) -> ModelCard:
         """Return the model card: what it was made from, by whom, its errors, limits and hashes.
 
@@ -504,32 +464,3 @@ class Surrogate:
                 fix="Learn it again from its solves: `palpate learn STUDY.toml`, or pp.learn(data)[0].save(file).",
             )
         return load_value(path, cls, kind=KIND, noun="a learnt body")
-
-
-def _training(meta: Mapping[str, Any]) -> str:
-    """Return in words what the record tells of training and correction."""
-    words = ""
-    if "solves" in meta:
-        words += f"; trained with {meta['solves']} solves"
-        if meta.get("samples", meta["solves"]) != meta["solves"]:
-            words += f" ({meta['samples']} samples by symmetry)"
-    error = meta.get("force_error")
-    if isinstance(error, Mapping) and {"median", "p95"} <= error.keys():
-        words += f"; force error {share(error['median'])} median, {share(error['p95'])} p95"
-    if (touches := correction_count(meta)) is not None:
-        words += f"; corrected by {touches} measured touches"
-        words += ", with a warning" if correction_warning(meta) else ""
-    return words
-
-
-def correction_count(meta: Mapping[str, Any]) -> int | None:
-    """Return how many measured touches have corrected a body; None for one as it was learnt."""
-    record = meta.get("correction")
-    counts = record.get("counts") if isinstance(record, Mapping) else None
-    return int(counts.get("learnt", 0)) if isinstance(counts, Mapping) else None
-
-
-def correction_warning(meta: Mapping[str, Any]) -> str:
-    """Return what was suspicious of the measurements that have corrected a body; "" if nothing was."""
-    record = meta.get("correction")
-    return str(record.get("warning", "")) if isinstance(record, Mapping) else ""

@@ -29,6 +29,7 @@ ANGLES: dict[str, tuple[str, ...]] = {
     "axis": ("tip_rx", "tip_ry"),
     "full": ("tip_rx", "tip_ry", "tip_rz"),
 }
+ROUNDING = 1e-9  # share of the largest angle by which rounding may carry one beyond it
 MOST_TILT = math.pi / 2  # rad; a tool that lies over farther does not press with its tip
 
 SHAPES: dict[str, type[Tool]] = {
@@ -139,6 +140,30 @@ class PosedTool:
         w[..., :count] = angles[..., :count]
         own = np.eye(3) if self.turn is None else self.turn
         return np.asarray(rotation_matrix(w) @ own)
+
+    def require_trained(self, X: np.ndarray) -> None:
+        """Refuse inputs (N, 3 + k) that turn the tool farther than it was tilted in training.
+
+        Raises
+        ------
+        UsageError
+            With the angles that would do.
+        """
+        angles = np.asarray(X, dtype=float)[:, 3 : 3 + len(ANGLES[self.turns])]
+        if not angles.size:
+            return
+        turns = np.maximum(
+            np.linalg.norm(angles[:, :2], axis=1), np.abs(angles[:, 2:]).max(axis=1, initial=0.0)
+        )
+        row = int(np.argmax(turns))
+        if turns[row] <= self.tilt * (1 + ROUNDING):
+            return
+        raise UsageError(
+            f"The {self.shape} is to be turned by {turns[row]:.3g} rad ({math.degrees(turns[row]):.3g}°) in row {row}.",
+            why=f"It was trained up to {self.tilt:.3g} rad ({math.degrees(self.tilt):.3g}°): what it meets beyond that "
+            "is not known.",
+            fix="Ask for a smaller turn, or sweep with a larger tilt and learn again.",
+        )
 
     def spread_angles(self, unit: np.ndarray) -> np.ndarray:
         """Return angles (N, k) in rad, even over the disc of all tilts, from k coordinates (N, k) between 0 and 1."""

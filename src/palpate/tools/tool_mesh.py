@@ -47,7 +47,9 @@ def tool_mesh(shape: Tool) -> ToolMesh:
     points = _facing(shape, normals.reshape(-1, 3)).reshape(normals.shape)
     if last < math.pi:
         points, normals = _with_shaft(shape, points, normals, last, columns)
-    return ToolMesh(points.reshape(-1, 3), normals.reshape(-1, 3), _grid_triangles(*points.shape[:2]))
+    return ToolMesh(
+        points.reshape(-1, 3), normals.reshape(-1, 3), _grid_triangles(points.shape[0], points.shape[1])
+    )
 
 
 def _facing(shape: Tool, normals: np.ndarray) -> np.ndarray:

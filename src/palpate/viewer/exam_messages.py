@@ -60,7 +60,11 @@ class ExamWish(Json):
 
     wish: str  # ``practise``, ``show``, ``leave``, ``examine``, ``resume``, ``mark``, ``answer``, ``remove`` or ``end``
     number: int = 0  # of the mark that is answered or removed
-    place: Vec3 = (0.0, 0.0, 0.0)  # m, of a new mark: the probe's centre, or any place above or under the skin
+    place: Vec3 = (
+        0.0,
+        0.0,
+        0.0,
+    )  # m, of a new mark: the probe's centre, or any place above or under the skin
     hardness: str = ""
     depth: str = ""
     name: str = ""  # of the examination that goes on

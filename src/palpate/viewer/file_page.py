@@ -122,6 +122,8 @@ class _Page:
     def of(cls, surrogate: Surrogate) -> _Page:
         """Return the page of a body with as many of its fields as it has room for."""
         surrogate = _shallow(surrogate)
+        known = [field.name for field in surrogate.fields.values()]
+        surrogate = _exported(surrogate)
         model = PageModel(touchable(surrogate))
         traits = device_traits("page")
         place = model.body.workspace(traits.radius)
@@ -151,7 +153,7 @@ class _Page:
         chosen = [keys[name] for name in names]
         fields = list(_fields_with_room(surrogate, chosen, block, coarse, surface, room))
         kept = {field.shown.name for field in fields}
-        left_out = tuple(field.name for field in surrogate.fields.values() if field.name not in kept)
+        left_out = tuple(name for name in known if name not in kept)
         card = card_of(surrogate).with_hash(f"{bare.label}, of a page", bare.hash)
         missing = {"fields that are not in this file": ", ".join(left_out)} if left_out else {}
         hello = replace(
@@ -231,6 +233,14 @@ def _shallow(surrogate: Surrogate) -> Surrogate:
         return surrogate
     nearer = baseline.with_surface(replace(surface, inner=inner))
     return surrogate.with_energy(replace(surrogate.hand_energy, baseline=nearer))
+
+
+def _exported(surrogate: Surrogate) -> Surrogate:
+    """Return the body with the fields that the evaluator core knows, none under a tool that turns."""
+    fields = {
+        key: field for key, field in surrogate.fields.items() if getattr(field, "contact", None) is None
+    }
+    return surrogate if len(fields) == len(surrogate.fields) else replace(surrogate, fields=fields)
 
 
 def _places(model: PageModel) -> dict[str, Any] | None:

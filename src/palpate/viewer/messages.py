@@ -203,7 +203,10 @@ class Step(Binary):
 
     index: Annotated[int, Wire("u32", "place in Shown.steps")]
     probed: Annotated[bool, Wire("flag", "a probe touches the body")]
-    centre: Annotated[Vec3, Wire("vec3", "m, of the probe")]
+    centre: Annotated[Vec3, Wire("vec3", "m, of the probe, or a tool's place")]
+    turn: Annotated[
+        Vec3, Wire("vec3", "rad, rotation vector that turns a tool about its place, beside its own")
+    ]
     radius: Annotated[float, Wire("f32", "m, of the probe")]
     displacement: Annotated[np.ndarray, Wire("floats", "m, x y z of each point of the surface")]
     values: Annotated[
@@ -283,7 +286,7 @@ class DrawnTool:
 
     words: str  # shape and sizes, such as ``capsule of radius 6 mm, 24 mm long``
     centre: Vec3  # (3,) way from the tool's place to its middle, m
-    # (3,) way from the tool's place to the ball whose depth counts, m: a file's core answers with contact points less it
+    # (3,) way from the tool's place to the ball whose depth counts, m: a file's core answers contact points less it
     shift: Vec3
     points: tuple[float, ...]  # x y z of each point from the place, m
     normals: tuple[float, ...]  # outward unit normal of each

@@ -35,6 +35,7 @@ class ShownStep:
     displacement: np.ndarray  # (node, 3), m
     values: Mapping[str, np.ndarray] = field(default_factory=dict)  # (node,) each, to colour by
     ball: tuple[np.ndarray, float] | None = None  # centre and radius of the probe, m
+    turn: np.ndarray | None = None  # (3,) rotation vector that turns the tool beside its own orientation, rad
     label: str = ""  # beside the slider; the step's number where there is none
     figures: Mapping[str, str] = field(default_factory=dict)  # what is known of it, in words
 
@@ -109,6 +110,9 @@ class ShownBody:
             probed=step.ball is not None,
             centre=(float(centre[0]), float(centre[1]), float(centre[2])),
             radius=float(radius),
+            turn=(0.0, 0.0, 0.0)
+            if step.turn is None
+            else (float(step.turn[0]), float(step.turn[1]), float(step.turn[2])),
             displacement=np.asarray(step.displacement, dtype=float)[parts.nodes].ravel(),
             values=np.concatenate(values) if values else np.zeros(0),
         )
@@ -165,6 +169,7 @@ def _step_of(solution: Any) -> ShownStep:
         displacement=solution.displacement,
         values={name: values for name, values in known.items() if values is not None},
         ball=ball,
+        turn=None if pose is None else np.append(pose[3:], np.zeros(6 - len(pose))),
         figures=_figures(
             getattr(solution, "response", None), getattr(solution, "potential_energy", None), ball
         ),
@@ -177,8 +182,8 @@ def _figures(response: Any, energy: Any, ball: tuple[np.ndarray, float] | None) 
     if ball is not None:
         places = ", ".join(f"{1e3 * c + 0.0:.1f}" for c in ball[0].round(6))
         found["probe"] = f"{places} mm".replace("-", "−")
-    if response is not None and np.size(response) == 3 and ball is not None:
-        size = float(np.linalg.norm(response))
+    if response is not None and np.size(response) >= 3 and ball is not None:
+        size = float(np.linalg.norm(np.ravel(response)[:3]))
         found["force on the probe"] = f"{size:.3g} N"
     if energy is not None and math.isfinite(float(energy)):
         found["energy"] = f"{1e3 * float(energy):.3g} mJ"
@@ -225,21 +230,23 @@ def body_of_dataset(dataset: Any, name: str) -> ShownBody:
     origin = dataset.provenance
     radius, tool = _radius(origin), _tool(origin)
     rest = np.asarray(data["rest"].values, dtype=float)
-    steps = [_sample(data, int(row), radius) for row in rows]
+    steps = [_sample(data, int(row), radius, tool) for row in rows]
     return ShownBody(
         name, rest, np.asarray(data["triangles"].values), steps, fixed=_fixed(data, origin), tool=tool
     )
 
 
-def _sample(data: Any, row: int, radius: float | None) -> ShownStep:
+def _sample(data: Any, row: int, radius: float | None, tool: PosedTool | None) -> ShownStep:
     sample = data.isel(sample=row)
     inputs = np.asarray(sample["inputs"].values, dtype=float)
-    ball = (inputs, radius) if radius is not None and inputs.shape == (3,) else None
+    angles = 0 if tool is None else len(tool.angles)
+    ball = (inputs[:3], radius) if radius is not None and inputs.shape == (3 + angles,) else None
     response = sample["response"].values if "response" in sample else None
     energy = sample["potential_energy"].values if "potential_energy" in sample else None
     return ShownStep(
         displacement=np.asarray(sample["displacement"].values, dtype=float),
         ball=ball,
+        turn=np.append(inputs[3:], np.zeros(3 - angles)) if ball is not None else None,
         label=f"sample {row}",
         figures=_figures(response, energy, ball),
     )

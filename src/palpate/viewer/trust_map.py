@@ -38,9 +38,10 @@ def trust_map(drawing: SurfaceDrawing) -> TrustMap:
         return TrustMap(depth=depth, high=1.0, known=False, values=values)
     distance, slope, _ = body.surface.at(points[touched])
     normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
+    height = body.radius - distance if body.tool is None else body.tool.offset(normals)
     low, high = bounds(body.inputs)
     X = np.tile((low + high) / 2.0, (len(touched), 1))
-    X[:, :3] = points[touched] + (body.radius - depth - distance)[:, None] * normals
+    X[:, :3] = points[touched] + (height - depth)[:, None] * normals
     inside = body.energy.inside(X)
     try:
         deviation, known = np.asarray(body.energy.deviation(X)), True

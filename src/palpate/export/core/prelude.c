@@ -18,6 +18,8 @@
 #define PP_EXP expf
 #define PP_EXPM1 expm1f
 #define PP_TANH tanhf
+#define PP_SIN sinf
+#define PP_POW powf
 #define PP_CBRT cbrtf
 #define PP_ABS fabsf
 #else
@@ -25,6 +27,8 @@
 #define PP_EXP exp
 #define PP_EXPM1 expm1
 #define PP_TANH tanh
+#define PP_SIN sin
+#define PP_POW pow
 #define PP_CBRT cbrt
 #define PP_ABS fabs
 #endif
@@ -49,9 +53,10 @@ PP_PART pp_real pp_nan(void) {
   return none / none;
 }
 
-/* whether the body is pressed by a free probe, by the closest point (1) or by its overlap (4) */
+/* whether the body is pressed by a free probe: by the closest point (1), by its overlap (4), by a tool in a pose (5) */
 PP_PART int pp_is_probe(const pp_array *a) {
-  return a[PP_HEAD].whole[PP_BASELINE_CODE] == 1 || a[PP_HEAD].whole[PP_BASELINE_CODE] == 4;
+  const int32_t code = a[PP_HEAD].whole[PP_BASELINE_CODE];
+  return code == 1 || code == 4 || code == 5;
 }
 
 PP_PART const pp_array *pp_baseline_array(const pp_model *m, int32_t i) { return &m->a[PP_BASELINE + i]; }

@@ -24,6 +24,7 @@ from palpate.rbf.freezing import freeze_refined, training_record
 from palpate.rbf.sample_checks import numbers
 from palpate.surrogates import FieldSurrogate, TouchedSurface
 from palpate.surrogates.fields.depth_amplitude import AMPLITUDES
+from palpate.surrogates.fields.posed_contact import PosedContact
 from palpate.units import Quantity, Range, bounds
 
 __all__ = [
@@ -75,11 +76,13 @@ def learn_snapshots(
     rest: np.ndarray | None = None,
     drawn: CarriedSurface | None = None,
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    tool: str = "",
     options: FieldOptions,
 ) -> LearntField:
     """Learn a field on a mesh from snapshots on the meshes that they were solved on; the context is `learn_field`'s.
 
-    `drawn` is the body's own surface, which the mesh carries in pictures; `shift` is that of `FieldSurrogate`.
+    `drawn` is the body's own surface, which the mesh carries in pictures; `shift` and `tool` are those of
+    `FieldSurrogate`.
 
     Raises
     ------
@@ -91,7 +94,8 @@ def learn_snapshots(
     checks.positive("The radius of the probe", radius, "m")
     budget = Budget.of(options.effort, options.seconds)
     context = (inputs, surface, radius, points, triangles, mass, radius_input, shift)
-    solves = Solves.of(snapshots, *context).touching
+    contact = PosedContact(tool, surface) if tool else None
+    solves = Solves.of(snapshots, *context, contact).touching
     tolerance = _TOLERANCE * solves.size if options.tolerance is None else options.tolerance
     length = radius / 10.0 if options.length is None else options.length
     with threadpool_limits(1):  # small matrices: more BLAS threads cost time and the bits of the result
@@ -120,6 +124,7 @@ def learn_snapshots(
         meta=meta,
         drawn=drawn,
         shift=shift,
+        tool=tool,
     )
     return LearntField(field, trials, best.truncation, best.truncation_left_out, error)
 

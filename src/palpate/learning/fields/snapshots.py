@@ -16,6 +16,7 @@ from palpate.errors import UsageError
 from palpate.surrogates import TouchedSurface
 from palpate.surrogates.fields import DepthAmplitude, LocalMode
 from palpate.surrogates.fields.field_kernels import moving_values
+from palpate.surrogates.fields.posed_contact import PosedContact
 from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation, node_normals
 from palpate.units import Range, bounds
 
@@ -66,6 +67,7 @@ class Solves:
     interpolations: tuple[SurfaceInterpolation | None, ...]
     # (3,), m, way from a solve's place to the centre of the ball that touches; `surface` is the body's less it
     shift: np.ndarray
+    contact: PosedContact | None = None  # where a tool touches whose balls tell the depth
 
     @classmethod
     def of(
@@ -79,6 +81,7 @@ class Solves:
         mass: np.ndarray,
         radius_input: int | None = None,
         shift: Sequence[float] = (0.0, 0.0, 0.0),
+        contact: PosedContact | None = None,
     ) -> Solves:
         """All of them, as they are."""
         facing = node_normals(points, triangles)
@@ -89,7 +92,9 @@ class Solves:
             for one in snapshots
         )
         context = (surface, radius, points, triangles, mass, radius_input)
-        return cls(tuple(snapshots), tuple(inputs), *context, interpolations, np.array(shift, dtype=float))
+        return cls(
+            tuple(snapshots), tuple(inputs), *context, interpolations, np.array(shift, dtype=float), contact
+        )
 
     @property
     def touching(self) -> Solves:
@@ -132,12 +137,16 @@ class Solves:
     @cached_property
     def depth(self) -> np.ndarray:
         """Depth (N,) of the rigid probe, m."""
+        if self.contact is not None:
+            return self.contact.at(self.X)[0]
         radius = self.radius if self.radius_input is None else self.X[:, self.radius_input]
         return self.surface.depth(np.ascontiguousarray(self.X[:, :3]), radius)
 
     @cached_property
     def contact_points(self) -> tuple[np.ndarray, np.ndarray]:
         """Touched places at rest and normals there, each (N, 3)."""
+        if self.contact is not None:
+            return self.contact.at(self.X)[1:]
         C = np.ascontiguousarray(self.X[:, :3])
         d, normals, _ = self.surface.at(C)
         return C + self.shift - d[:, None] * normals, normals

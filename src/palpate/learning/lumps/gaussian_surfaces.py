@@ -15,7 +15,7 @@ from palpate.network import Network
 from palpate.network.network import Scaling
 from palpate.units import Quantity, Range
 
-__all__ = ["Samples", "fit_surface", "fit_widths"]
+__all__ = ["Samples", "Surface", "as_network", "fit_surface", "fit_widths", "spread_rows"]
 
 RIDGE = 1e-8  # on squared weights, over the mean square of a column
 PART = 4000  # rows whose regressors are held at once
@@ -162,4 +162,4 @@ def spread_rows(Z: np.ndarray, count: int) -> np.ndarray:
     while len(chosen) < count:
         chosen.append(int(nearest.argmax()))
         nearest = np.minimum(nearest, ((some - some[chosen[-1]]) ** 2).sum(axis=1))
-    return some[chosen]
+    return np.asarray(some[chosen])

@@ -24,7 +24,7 @@ from palpate.surrogates.lumps.lump_contrast import LumpContrast, closed_form, co
 from palpate.surrogates.lumps.lump_room import LumpRoom, skin_of
 from palpate.units import Quantity, Range
 
-__all__ = ["LEAST_CONTRAST", "LumpPresses", "learn_lumps"]
+__all__ = ["LEAST_CONTRAST", "LumpPresses", "change_errors", "learn_lumps"]
 
 LEAST_CONTRAST = 0.01  # of the force: a change below it is felt by nobody, and is not judged
 FELT = 0.003  # ΔU/U at which a lookup counts half
@@ -88,16 +88,16 @@ class LumpPresses:
             )
         data = data.ok
         data = data.take(np.flatnonzero(data.potential_energy > 0.0))
-        room = LumpRoom(
-            *map(np.array, record["room"]),
-            Range("radius", *record["radius"], "m"),
-            Range("ratio", *record["ratio"]),
-            record["cover"],
-            skin_of(data.rest, data.triangles),
-        )
+        (least, largest), (softest, hardest) = record["radius"], record["ratio"]
+        lower, upper = map(np.array, record["room"])
+        sizes = Range("radius", least, largest, "m"), Range("ratio", softest, hardest)
+        room = LumpRoom(lower, upper, *sizes, record["cover"], skin_of(data.rest, data.triangles))
         names = ("place", "radius", "energy", "slope", "compliance", "ratio", "added", "force")
-        lumps = [np.asarray(data[f"lump_{name}"]) for name in names]
-        return cls(data.X, data.potential_energy, data.response, *lumps, room, *declared_symmetry(data))
+        lumps: Any = [np.asarray(data[f"lump_{name}"]) for name in names]
+        symmetry, about = declared_symmetry(data)
+        return cls(
+            data.X, data.potential_energy, data.response, *lumps, room=room, symmetry=symmetry, about=about
+        )
 
     def take(self, rows: np.ndarray) -> LumpPresses:
         """Return some of the presses."""
@@ -233,11 +233,11 @@ class _Shape:
         """Return the contrast learnt from presses, with a given k."""
         dense = fit_surface(self.density_rows(presses)[0], self.widths, units)
         soft = fit_surface(self.compliance_rows(presses)[0], self.soft_widths, min(units, FEWER_UNITS))
-        networks = (
+        density, compliance = (
             as_network(surface, self.inputs, Quantity(name), self.scaling)
             for surface, name in ((dense, "ln(D/U), its closed form apart"), (soft, "ln beta"))
         )
-        return LumpContrast(*networks, self.decay, k, presses.room)
+        return LumpContrast(density, compliance, self.decay, k, presses.room)
 
 
 def _rows(presses: LumpPresses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 
 __all__ = ["LumpProblem"]
 
-FINE = 0.8  # largest element in the room over the least radius of a lump: its contrast is then true to a few per cent
+FINE = (
+    0.6  # largest element in the room over the least radius of a lump: its contrast is then true to about 5 %
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ class LumpProblem:
     ratio : tuple of two floats
         Least and largest ratio of moduli of the lumps that presses are solved with.
     element : float, optional
-        Largest element in m where lumps may be; by default 0.8 of the least radius.
+        Largest element in m where lumps may be; by default 0.6 of the least radius.
     cover : float
         Least tissue in m between a lump's edge and any surface of the body.
     lookups : int

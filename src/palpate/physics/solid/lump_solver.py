@@ -21,7 +21,7 @@ from palpate.surrogates.lumps.lump import EDGE, MIX, Lump, share_of_lump
 if TYPE_CHECKING:
     from palpate.physics.solid.lump_problem import LumpProblem
 
-__all__ = ["LumpSolution", "LumpSolver"]
+__all__ = ["LumpSolution", "LumpSolver", "LumpedPress"]
 
 NO_LUMP = (0.0, 0.0, 0.0, 1.0, 1.0)  # x, y, z, radius (m) and ratio
 NEAR = 0.014  # m beyond the ball: half the lumps are looked up within that, where they are felt
@@ -134,7 +134,7 @@ class LumpSolver:
         energies, slopes = self.energies(solution, places, radii)
         few = zip(places[: self._problem.compliances], radii, strict=False)
         compliances = np.array([self.compliance(solution, place, radius) for place, radius in few])
-        own = {}
+        own: dict[str, Any] = {}
         if wanted:
             with_lump = self.press_with(solution, Lump(tuple(places[0].tolist()), float(radii[0]), ratio))
             good = with_lump.stop is Stop.CONVERGED
@@ -211,7 +211,7 @@ class LumpSolver:
             for many in (-2, -1, 1, 2):
                 moved = np.array(numbers)
                 moved[i] += many * step
-                self._set(moved)
+                self._set(moved.tolist())
                 values.append(self._model.system.potential(z))
             slopes[i] = (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * step)
         return slopes

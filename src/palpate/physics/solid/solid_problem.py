@@ -49,6 +49,8 @@ if TYPE_CHECKING:
 __all__ = ["SolidProblem"]
 
 
+_FREQUENCIES: dict[str, float | None] = {}  # in Hz, by the description of a body: each is found once
+
 FINE = 0.1  # quantile of the sides of the surface's elements: they are fine where the body is touched
 
 
@@ -217,12 +219,16 @@ class SolidProblem:
 
         None where it could not be found: of a body that nothing holds, or whose mesh ends the child process.
         """
-        coarse, foreign = replace(self, fine=()), is_foreign(self.body.geometry)
-        try:
+        key = json.dumps(self.body.describe(), sort_keys=True)
+        if key not in _FREQUENCIES:
             apart = partial(run_in_child, natural_frequency, limit=CASE_LIMIT)
-            lowest = (apart if foreign else natural_frequency)(coarse)
-        except (SolverError, RuntimeError):  # what ARPACK and NGSolve raise, too
-            return None
+            find = apart if is_foreign(self.body.geometry) else natural_frequency
+            try:
+                found = find(replace(self, fine=()))
+            except (SolverError, RuntimeError):  # what ARPACK and NGSolve raise, too
+                found = None
+            _FREQUENCIES[key] = found
+        lowest = _FREQUENCIES[key]
         if lowest is None:
             return None
         assumed = not all(material.density for material in self.body.materials.values())

@@ -14,11 +14,10 @@ PP_PART pp_real contact_law(const pp_real *own, pp_real s, pp_real *slope, pp_re
   return g * s * s;
 }
 
-PP_PART int contact_enter(const pp_model *m, const pp_real *x, const pp_real *p, pp_work *w) {
+/* the law's energy and derivatives at a depth s, whose -ds/dx and -d2s/dx2 are in `outward` and `surface`; whether it
+ * touches */
+PP_PART int contact_fill(const pp_model *m, pp_real s, pp_work *w) {
   const pp_real *own = pp_baseline_array(m, 0)->real, *numbers = m->a[PP_NUMBERS].real;
-  const int32_t which = (int32_t)own[4];
-  const pp_real radius = which < 0 ? own[3] : p[which];
-  const pp_real s = radius - pp_distance(x, w->outward, w->surface, pp_baseline_array(m, 1));
   pp_real slope, bend, depth, unused, none;
   int i, j;
   w->base[1] = s;
@@ -36,6 +35,13 @@ PP_PART int contact_enter(const pp_model *m, const pp_real *x, const pp_real *p,
     w->moved[i] += (s - depth) * w->outward[i];
   }
   return 1;
+}
+
+PP_PART int contact_enter(const pp_model *m, const pp_real *x, const pp_real *p, pp_work *w) {
+  const pp_real *own = pp_baseline_array(m, 0)->real;
+  const int32_t which = (int32_t)own[4];
+  const pp_real radius = which < 0 ? own[3] : p[which];
+  return contact_fill(m, radius - pp_distance(x, w->outward, w->surface, pp_baseline_array(m, 1)), w);
 }
 
 PP_NO_REST(contact)
@@ -62,14 +68,15 @@ PP_PART void contact_bend(const pp_model *m, const pp_real *x, const pp_real *g,
   }
 }
 
-PP_PART void contact_leave(const pp_model *m, const pp_real *x, pp_work *w) {
+/* take slopes and curvatures of l through the move to the saturated depth; `bend` is the derivative of -d2s/dx2 along
+ * the slopes, and is overwritten */
+PP_PART void contact_leave_by(const pp_model *m, pp_work *w, pp_real *bend) {
   const pp_real *numbers = m->a[PP_NUMBERS].real, *D = w->surface, *d = w->outward, *g = w->slope, s = w->base[1];
-  pp_real slope, curvature, excess, along, rest, J[9], bend[9], fresh[3], h[3];
+  pp_real slope, curvature, excess, along, rest, J[9], fresh[3], h[3];
   const pp_real depth = pp_saturated(s, numbers[1], numbers[2], &slope, &curvature);
   int i, j, a, b;
   if (s <= depth) return;
   excess = s - depth;
-  contact_bend(m, x, g, bend);
   along = d[0] * g[0] + d[1] * g[1] + d[2] * g[2];
   rest = R(1) - slope;
   for (i = 0; i < 3; i++) {
@@ -89,4 +96,11 @@ PP_PART void contact_leave(const pp_model *m, const pp_real *x, pp_work *w) {
   }
   for (i = 0; i < 3; i++) w->slope[i] = fresh[i];
   for (i = 0; i < 9; i++) w->log[i] = bend[i];
+}
+
+PP_PART void contact_leave(const pp_model *m, const pp_real *x, pp_work *w) {
+  pp_real bend[9];
+  if (w->base[1] <= m->a[PP_NUMBERS].real[1]) return;
+  contact_bend(m, x, w->slope, bend);
+  contact_leave_by(m, w, bend);
 }

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -27,6 +28,7 @@ from palpate.surrogates.baselines.contact_baseline import (
     fill_law,
     leave_saturated,
 )
+from palpate.surrogates.baselines.graph_form import BaselineForm, Graph, Touch, Value
 from palpate.surrogates.baselines.tool_baseline import ToolBaseline
 from palpate.surrogates.energy_kernels import (
     BEND,
@@ -67,12 +69,12 @@ class PosedBaseline(ToolBaseline):
     tool : str
         The tool's description as JSON, from which `PosedTool.of` makes it.
     order : float
-        m, at least 2.
+        m, at least 2; the larger, the more the deepest ball counts.
     """
 
     name: ClassVar[str] = "posed"
 
-    order: float = 4.0
+    order: float = 8.0
 
     @cached_property
     def balls(self) -> np.ndarray:
@@ -107,7 +109,12 @@ class PosedBaseline(ToolBaseline):
         return self.name
 
     def c_source(self) -> str:
-        """Refuse: it has no exported form yet.
+        """Return the kernels in C99, those of a contact before them."""
+        own = Path(__file__).with_suffix(".c").read_text("utf-8")
+        return f"{super().c_source()}\n{own}"
+
+    def graph_form(self, graph: Graph, place: Value, touch: Touch | None, xi: Value) -> BaselineForm:
+        """Refuse: the mean over its balls has no form as a graph.
 
         Raises
         ------
@@ -115,9 +122,9 @@ class PosedBaseline(ToolBaseline):
             Always.
         """
         raise UsageError(
-            f"A body under {self.probe_words} can't be exported yet.",
-            why="Its baseline, that of a tool that turns or of a curved surface, has no form in C.",
-            fix="Ask it in Python, feel it by `palpate run`, or learn a tool of one orientation on a plane surface.",
+            f"A body under {self.probe_words} has no ONNX form.",
+            why="Its baseline is that of a tool that turns or of a curved surface.",
+            fix="Ask it in Python, or learn a tool of one orientation on a plane surface.",
         )
 
     def coordinate(self, X: np.ndarray) -> np.ndarray:

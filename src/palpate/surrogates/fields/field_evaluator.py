@@ -9,7 +9,13 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.network.network_kernels import PRECISIONS, Precision
 from palpate.surrogates.arguments import NONE, place_at
-from palpate.surrogates.fields.field_kernels import FRAME, coefficients_into, field_into, profile_into
+from palpate.surrogates.fields.field_kernels import (
+    FRAME,
+    coefficients_into,
+    field_into,
+    posed_coefficients_into,
+    profile_into,
+)
 from palpate.surrogates.fields.local_mode import OFFSETS
 
 if TYPE_CHECKING:
@@ -51,7 +57,8 @@ class FieldEvaluator:
         arguments = (self._flat, self._z, self._place, np.ascontiguousarray(rows), self._profile, line)
         self._third: tuple[Any, ...] = (*arguments, *surrogate.moving_arguments())
         self._shape = (n - 3,)
-        self._shift = np.array(surrogate.shift)
+        self._shift, self._contact = np.array(surrogate.shift), surrogate.contact
+        self._posed = (self._z, self._place, *scratch[:2], numbers, limits, net)
         low = np.array([r.low for r in surrogate.inputs])
         self(low[:3], low[3:])  # compile now, not in the loop
         self.field()
@@ -65,6 +72,10 @@ class FieldEvaluator:
             If there are not three coordinates and p parameters.
         """
         position, parameters = place_at(position, parameters, self._shape)
+        if self._contact is not None:
+            s, foot, normal = self._contact.at(np.append(position, parameters)[None])
+            touch = (float(s[0]), foot[0], normal[0])
+            return bool(posed_coefficients_into(position, parameters, *touch, *self._posed))
         touches = bool(coefficients_into(position, parameters, *self._first))
         if touches:
             self._place[2:5] += self._shift

@@ -42,6 +42,7 @@ __all__ = [
     "field_into",
     "moving_into",
     "moving_values",
+    "posed_coefficients_into",
     "profile_arguments",
     "profile_into",
 ]
@@ -61,12 +62,9 @@ def _taken(lines, limits) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN0
             lines[1, i] = saturated(t, high, width)[0]
 
 
-@kernel
-def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface, net) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    """Coefficients into z and the probe's frame into place; whether there is contact.
-
-    Not-a-number where an input is not finite.
-    """
+@part
+def _begun(c, p, z, place, lines) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Put the inputs into the first line; whether all are finite."""
     z[:] = 0.0
     z[0] = 1.0
     place[:] = 0.0
@@ -75,6 +73,36 @@ def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface,
         if not math.isfinite(lines[0, i]):
             z[:] = math.nan
             return False
+    return True
+
+
+@part
+def _coefficients(z, place, b, lines, numbers, limits, net) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Coefficients of a touch whose depth, place and normal are in its frame."""
+    s = place[0]
+    f = amplitude_at(s, numbers[4], numbers[5], numbers[6])
+    place[1] = f
+    for i in range(lines.shape[1]):
+        lines[1, i] = lines[0, i]
+    deep = saturated(s, numbers[2], numbers[3])[0]
+    for i in range(3):
+        lines[1, i] += (s - deep) * place[5 + i]
+    _taken(lines, limits)
+    for i in range(3, lines.shape[1]):
+        place[FRAME - 3 + i] = lines[1, i]
+    point_into(lines[1], b, *net)
+    for k in range(b.size):
+        z[1 + k] = f * b[k]
+
+
+@kernel
+def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface, net) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Coefficients into z and the probe's frame into place; whether there is contact.
+
+    Not-a-number where an input is not finite.
+    """
+    if not _begun(c, p, z, place, lines):
+        return False
     g = small[1, 0]
     own = int(numbers[1])
     radius = numbers[0] if own < 0 else lines[0, own]
@@ -83,21 +111,25 @@ def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface,
     place[0] = s
     if s <= 0.0:
         return False
-    f = amplitude_at(s, numbers[4], numbers[5], numbers[6])
-    place[1] = f
-    for i in range(lines.shape[1]):
-        lines[1, i] = lines[0, i]
-    deep = saturated(s, numbers[2], numbers[3])[0]
     for i in range(3):
-        lines[1, i] += (s - deep) * g[i]
         place[2 + i] = c[i] - d * g[i]
         place[5 + i] = g[i]
-    _taken(lines, limits)
-    for i in range(3, lines.shape[1]):
-        place[FRAME - 3 + i] = lines[1, i]
-    point_into(lines[1], b, *net)
-    for k in range(b.size):
-        z[1 + k] = f * b[k]
+    _coefficients(z, place, b, lines, numbers, limits, net)
+    return True
+
+
+@kernel
+def posed_coefficients_into(c, p, s, foot, normal, z, place, b, lines, numbers, limits, net) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Coefficients and frame as above, of a touch whose depth s (m), place (3,) in m and normal (3,) are known."""
+    if not _begun(c, p, z, place, lines):
+        return False
+    place[0] = s
+    if s <= 0.0:
+        return False
+    for i in range(3):
+        place[2 + i] = foot[i]
+        place[5 + i] = normal[i]
+    _coefficients(z, place, b, lines, numbers, limits, net)
     return True
 
 

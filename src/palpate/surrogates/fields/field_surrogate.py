@@ -31,6 +31,7 @@ from palpate.surrogates.fields.field import Field
 from palpate.surrogates.fields.field_evaluator import FieldEvaluator
 from palpate.surrogates.fields.field_kernels import moving_values, profile_arguments
 from palpate.surrogates.fields.local_mode import LocalMode
+from palpate.surrogates.fields.posed_contact import PosedContact
 from palpate.surrogates.fields.surface_interpolation import SurfaceInterpolation, node_normals
 from palpate.surrogates.surface import TouchedSurface
 from palpate.units import bounds
@@ -142,6 +143,9 @@ class FieldSurrogate(Field):
     shift : tuple of three floats
         Way in m from c to the centre of the ball whose depth counts: zero for a ball, the way from a tool's place.
         `surface` is the body's less that way.
+    tool : str
+        Description as JSON of a tool that turns, or presses a curved surface: then its balls tell the depth. Empty for
+        a ball, and for a tool that one ball stands for.
 
     Raises
     ------
@@ -168,6 +172,7 @@ class FieldSurrogate(Field):
     meta: Mapping[str, Any] = field(default_factory=dict)
     drawn: CarriedSurface | None = None
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tool: str = ""
 
     def __post_init__(self) -> None:
         own_arrays(self, *_ARRAYS)
@@ -267,6 +272,11 @@ class FieldSurrogate(Field):
             return np.zeros(len(self.points), dtype=np.bool_)
         return self._touches(self.points)
 
+    @cached_property
+    def contact(self) -> PosedContact | None:
+        """Where a tool touches whose balls tell the depth; None where one ball does."""
+        return PosedContact(self.tool, self.surface) if self.tool else None
+
     def _touches(self, points: np.ndarray) -> np.ndarray:
         """Return which points (P, 3) in m the moving part moves, (P,) bool."""
         assert self.local_mode is not None
@@ -303,6 +313,8 @@ class FieldSurrogate(Field):
     def depth(self, X: np.ndarray) -> np.ndarray:
         """s (N,) of the rigid probe into the surface at rest, m; negative without contact."""
         X = self._checked(X)
+        if self.contact is not None:
+            return self.contact.at(X)[0]
         radius = self.radius if self.radius_input is None else X[:, self.radius_input]
         return self.surface.depth(X[:, :3], radius)
 

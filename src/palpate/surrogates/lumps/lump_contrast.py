@@ -34,7 +34,7 @@ from palpate.surrogates.lumps.lump_room import LumpRoom
 if TYPE_CHECKING:
     from palpate.surrogates.energy import LearntEnergy
 
-__all__ = ["LumpContrast", "contrast_inputs", "value_and_slopes"]
+__all__ = ["LumpContrast", "closed_form", "contrast_inputs", "value_and_slopes"]
 
 
 @dataclass(frozen=True, eq=False)

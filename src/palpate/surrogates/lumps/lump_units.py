@@ -1,9 +1,9 @@
 """Lumps as further units of a body's network: the body with them is a learnt body like any other.
 
 With ΔU/U of the lumps known in closed form, U (1 + Σ ΔU/U) = U₀ exp(ℓ + f), f = ln(1 + Σ ΔU/U). Over the places of a
-hand f is smooth, and nothing but near the lumps. So f and its slopes are taken at places about them, and units of
-one width about some of these places are fitted to both by least squares. The units join those of ℓ: loop, page and
-every export evaluate the body with lumps by what they have, in the time of a few more units.
+hand f is smooth, and nothing but near the lumps. So f and its slopes are taken at trained places, and units of one
+width about some of them, of the network's own radial function, are fitted to both by least squares. They join those of
+ℓ: loop, page and every export evaluate the body with lumps by what they have, in the time of some more units.
 """
 
 from __future__ import annotations
@@ -23,9 +23,16 @@ from palpate.units import bounds
 __all__ = ["energy_with_lumps"]
 
 PLACES = 2400  # of the hand about the lumps, at which f is taken
-UNITS = 160  # for each lump
-WIDTHS = (0.008, 0.012, 0.018)  # m, of which the best is taken: a press is felt over about a contact's width
-RIDGE = 1e-9  # on squared weights, over the mean square of a unit
+UNITS, MOST_UNITS = 240, 600  # for each lump, and for all
+WIDTHS = (
+    0.008,
+    0.012,
+    0.018,
+    0.03,
+    0.05,
+)  # m, of which the best is taken: a press is felt over about a contact's width
+REACH = 0.003  # m over which a slope of f is felt beside f: U/F of a press of some mm
+RIDGE = 1e-10  # on squared weights, over the mean square of a unit
 RATIO = 0.02  # share of the largest f below which a place is not about a lump
 
 
@@ -50,7 +57,7 @@ def energy_with_lumps(energy: LearntEnergy, contrast: LumpContrast, lumps: Seque
     X = _places(energy)
     f, slopes = _log_factor(contrast, felt, X)
     about = np.abs(f) > RATIO * np.abs(f).max()
-    return _with_units(energy, X, f, slopes, X[about], UNITS * len(felt))
+    return _with_units(energy, X, f, slopes, X[about], min(UNITS * len(felt), MOST_UNITS))
 
 
 def _places(energy: LearntEnergy) -> np.ndarray:
@@ -79,9 +86,9 @@ def _log_factor(
 def _with_units(
     energy: LearntEnergy, X: np.ndarray, f: np.ndarray, slopes: np.ndarray, about: np.ndarray, units: int
 ) -> LearntEnergy:
-    """Return the energy whose ℓ has units more, which are f (N,) and its slopes (N, 3) at X (N, 3)."""
+    """Return the energy whose ℓ has Gaussians more, which are f (N,) and its slopes (N, 3) at X (N, 3)."""
     centres = _spread(about, min(units, len(about)))
-    fits = [_fit(energy.network.radial, X, f, slopes, centres, width) for width in WIDTHS]
+    fits = [_fit(X, f, slopes, centres, width, energy.network.radial) for width in WIDTHS]
     weights, _, width = min(fits, key=lambda fit: fit[1])
     network, half = energy.network, energy.network.scaling.input_half
     rank = network.factors.shape[1]
@@ -102,25 +109,19 @@ def _with_units(
 
 
 def _fit(
-    kind: RadialFunction, X: np.ndarray, f: np.ndarray, slopes: np.ndarray, centres: np.ndarray, width: float
+    X: np.ndarray, f: np.ndarray, slopes: np.ndarray, centres: np.ndarray, width: float, form: RadialFunction
 ) -> tuple[np.ndarray, float, float]:
-    """Return weights of units about centres, the mean square error of slopes and values, and the width in m.
-
-    The units are of the body's own radial function: a network has one.
-    """
+    """Return weights of units about centres, the mean square of what they miss, and their width in m."""
     far = (X[:, None] - centres[None]) / width
-    phi, by_square, _ = radial(kind, (far**2).sum(axis=2))
-    rows = np.concatenate([phi, *(2.0 * far[:, :, i] * by_square for i in range(3))])
+    phi, slope, _ = radial(form, (far**2).sum(axis=2))
+    rows = np.concatenate([phi, *(2.0 * far[:, :, i] * slope for i in range(3))])
     target = np.concatenate([f, *(width * slopes.T)])
     normal = rows.T @ rows
     normal[np.diag_indices_from(normal)] += RIDGE * np.trace(normal) / len(normal)
     weights = np.linalg.solve(normal, rows.T @ target)
     missed = rows @ weights - target
-    return (
-        weights,
-        float(np.mean(missed[: len(f)] ** 2) + np.mean((missed[len(f) :] / width) ** 2) * WIDTHS[0] ** 2),
-        width,
-    )
+    missed[len(f) :] *= REACH / width
+    return weights, float(np.mean(missed**2)), width
 
 
 def _spread(points: np.ndarray, count: int) -> np.ndarray:

@@ -152,12 +152,17 @@ def _refresh(fresh, dt, slipped, law, depth) -> float:  # type: ignore[no-untype
 
 
 @kernel
-def _rub(position, q, slope, dt, force, energies, hold, springs, law, depths, way) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    """Move the tool and add the springs' force to `force` (3,), N, which is that without friction.
+def _rub(position, q, slope, dt, stored, lost, force, ledger, hold, springs, law, depths, way) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    """Move the tool, add the springs' force to `force` (3,), N, which is that without friction, and book the step.
 
-    `energies` gets what the springs store and what is lost in the step, J. `hold` (6,) has whether there was contact,
-    the last place, k and φ; `law` has μ_s, μ_k, ρ, m and t_h; `way` (3,) is scratch.
+    `stored` and `lost`, J, are what the body itself stores then and has lost in the step; negative where it forgets,
+    and the force is made here. `hold` (6,) has whether there was contact, the last place, k and φ; `law` has μ_s, μ_k,
+    ρ, m and t_h; `way` (3,) is scratch.
     """
+    if stored < 0.0:
+        stored = 0.5 * q * q
+        for a in range(3):
+            force[a] = -q * slope[a]
     normal_force, depth, total = _contact(q, slope, force, law[3], depths)
     mu, old, slipped, along = law[1] + (law[0] - law[1]) * hold[5], hold[4], 0.0, 0.0
     k = law[2] * normal_force / total if total > 0.0 else 0.0
@@ -166,22 +171,25 @@ def _rub(position, q, slope, dt, force, energies, hold, springs, law, depths, wa
         along += way[a] * slope[a]
     for a in range(3):
         way[a] -= along * slope[a] / _norm(slope) ** 2 if total > 0.0 else 0.0
-    energies[0] = energies[1] = 0.0
+    heat = 0.0
     for j in range(depths.size):
         f = springs[j]
         if depth <= depths[j]:
-            energies[1] += _norm(f) ** 2 / (2.0 * old) if old > 0.0 else 0.0
+            heat += _norm(f) ** 2 / (2.0 * old) if old > 0.0 else 0.0
             f[:] = 0.0
             continue
         limit = mu * normal_force * (depth - depths[j]) / total
-        energies[1] += _settle(f, slope, old, k, limit) if old > 0.0 else 0.0
+        heat += _settle(f, slope, old, k, limit) if old > 0.0 else 0.0
         slip = _stretch(f, way, k, limit)
-        energies[1] += limit * slip
+        heat += limit * slip
         slipped = slip if j == 0 else slipped  # the first spring in is the last to slip
-        energies[0] += _norm(f) ** 2 / (2.0 * k)
+        stored += _norm(f) ** 2 / (2.0 * k)
         for a in range(3):
             force[a] += f[a]
-    energies[1] = max(energies[1], 0.0)
+    lost += max(heat, 0.0)
+    ledger[2] += stored - ledger[0] + lost
+    ledger[0], ledger[3] = stored, lost
+    ledger[1] += lost
     hold[0], hold[4], hold[5] = 1.0 if total > 0.0 else 0.0, k, _refresh(hold[5], dt, slipped, law, depth)
     for a in range(3):
         hold[1 + a] = position[a]
@@ -369,7 +377,7 @@ class FrictionState(MemoryState):
         self.friction = friction
         self.under = None if friction.under is None else friction.under.start()
         self._hold, self._springs = np.zeros(6), np.zeros((len(friction.depths), 3))
-        self._energies, self._way = np.zeros(2), np.zeros(3)
+        self._way = np.zeros(3)
         self._law, self._depths = friction.law, friction.depths
         self.reset()
         self.step(np.zeros(3), 0.0, np.zeros(3), 0.0)  # compile now, not in the loop
@@ -408,18 +416,14 @@ class FrictionState(MemoryState):
         self.force[:] = 0.0
         if not _is_sound(position, amplitude, slope, dt):
             return False
-        stored, lost, under = 0.5 * amplitude * amplitude, 0.0, self.under
-        if under is None:
-            for a in range(3):
-                self.force[a] = -amplitude * slope[a]
-        else:
+        stored, lost, under = -1.0, 0.0, self.under
+        if under is not None:
             if not under.step(position, amplitude, slope, dt):
                 return False
             self.force[:] = under.force
             stored, lost = under.stored, under.lost_in_step
         _rub(
-            position, amplitude, slope, dt, self.force, self._energies, self._hold, self._springs,
+            position, amplitude, slope, dt, stored, lost, self.force, self._ledger, self._hold, self._springs,
             self._law, self._depths, self._way,
         )  # fmt: skip
-        self.book(stored + float(self._energies[0]), lost + float(self._energies[1]))
         return True

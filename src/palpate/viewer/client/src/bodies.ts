@@ -20,7 +20,7 @@ import type { View } from "./view";
 import type { Vector3 } from "three";
 
 const WORDS = ["title", "tools", "scale-notes", "legend"];
-const TRUST_NOTE = "One standard deviation, with the ball half as deep as it may go.";
+const TRUST_NOTE = "One standard deviation, with the probe half as deep as it may go.";
 
 /** A body on the page, with the hand that touches it. */
 export interface Body {

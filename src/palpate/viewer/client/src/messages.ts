@@ -557,8 +557,10 @@ export interface Step {
   index: number;
   /** a probe touches the body */
   probed: boolean;
-  /** m, of the probe */
+  /** m, of the probe, or a tool's place */
   centre: Vec3;
+  /** rad, rotation vector that turns a tool about its place, beside its own */
+  turn: Vec3;
   /** m, of the probe */
   radius: number;
   /** m, x y z of each point of the surface */
@@ -571,6 +573,7 @@ const STEP_LAYOUT: Layout = [
   ["index", "u32"],
   ["probed", "flag"],
   ["centre", "vec3"],
+  ["turn", "vec3"],
   ["radius", "f32"],
   ["displacement", "floats"],
   ["values", "floats"],

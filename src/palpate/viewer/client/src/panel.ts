@@ -14,7 +14,8 @@ const AT_FIRST = 0.5; // of the deepest trained depth, how deep a press goes
 const SAME = 1e-6; // of a range, by which its ends may differ and still be as far
 const MOST = 1.25; // so that it can be seen what lies outside
 const NUMBERS = ["force-norm", "force-x", "force-y", "force-z", "tip-x", "tip-y", "tip-z", "tip-norm"];
-const UNKNOWN = [...NUMBERS, "depth", "stiffness", "rate", "picture-rate"];
+const DEGREES = { size: Math.PI / 180, unit: "°" }; // people turn by degrees
+const UNKNOWN = [...NUMBERS, "torque-norm", "torque-x", "torque-y", "torque-z", "depth", "stiffness", "rate", "picture-rate"];
 
 const PULLING: Places = {
   inside: "Within what it was trained on.",
@@ -218,7 +219,8 @@ function subtitle(hello: Hello): (Node | string)[] {
   // the words of a tool are long, and may be parted
   const probe = hello.tool ? hello.tool.words : whole(`probe of radius ${measured(hello.radius, "m")}`);
   const press = [probe, whole(`trained to ${measured(hello.deepest, "m")} deep`)];
-  const ranges = hello.holds ? hello.inputs : hello.parameters;
+  // the words of a tool tell how far it turns
+  const ranges = hello.holds ? hello.inputs : hello.parameters.filter((_, i) => !hello.tool?.turns.includes(i));
   const parts = [...(hello.holds ? [] : press), ...trained(ranges)];
   const joined = parts.flatMap((part, i) => (i === 0 ? [part] : [", ", part]));
   return hello.holds ? ["trained on ", ...joined] : joined;
@@ -287,7 +289,7 @@ function sliders(parameters: RangeInfo[], moved: (i: number, value: number) => v
       [slider.type, slider.id] = ["range", `parameter-${i}`];
       [slider.min, slider.max] = [String(range.low), String(range.high)];
       slider.step = String((range.high - range.low) / 200);
-      const { size, unit } = rangeUnit(range.low, range.high, range.unit);
+      const { size, unit } = range.unit === "rad" ? DEGREES : rangeUnit(range.low, range.high, range.unit);
       [slider.dataset["size"], slider.dataset["unit"]] = [String(size), unit];
       slider.addEventListener("input", () => moved(i, slider.valueAsNumber));
       name!.append(range.words);

@@ -60,7 +60,7 @@ export class PartForm {
     const value = (id: string): string => element<HTMLInputElement | HTMLSelectElement>(id).value;
     const [young, poisson] = [value("young"), value("poisson")];
     const [radius, depth] = [value("ball-radius"), value("ball-depth")];
-    const sizes = Object.fromEntries(this.tool.sizes.map(({ name }) => [name, value(`size-${name}`)]));
+    const sizes = Object.fromEntries(this.tool.sizes.map(({ name }) => [name, value(sizeId(name))]));
     const regions = Object.fromEntries(this.facts.regions.map(({ name }, i) => [name, value(`region-${i}`).trim()]));
     const material = { material: value("material"), law: value("law"), young, poisson, regions };
     return { ...material, radius, depth, trial, tool: this.tool.name, sizes };
@@ -142,10 +142,10 @@ export class PartForm {
     for (const field of [...this.boxes.keys()]) if (field.startsWith("size-")) this.boxes.delete(field);
     element("tool-sizes").hidden = ball;
     element("tool-sizes").replaceChildren(
-      ...tool.sizes.flatMap(({ name, words }) => labelled(`size-${name}`, words)),
+      ...tool.sizes.flatMap(({ name, words }) => labelled(sizeId(name), words)),
     );
     for (const { name, value } of tool.sizes) {
-      this.boxes.set(`size-${name}`, `size-${name}`);
+      this.boxes.set(`size-${name}`, sizeId(name));
       this.prepare(`size-${name}`, value);
     }
     this.drawn = new ToolShape(null, ball ? this.radius : 0);
@@ -198,4 +198,9 @@ export class PartForm {
   private draw(): void {
     input("ball-radius").dataset["metres"] = String(this.radius); // for programs that drive the page
   }
+}
+
+/** The id of the box of a size. */
+function sizeId(name: string): string {
+  return `size-${name.replaceAll("_", "-")}`;
 }

@@ -1,0 +1,197 @@
+"""Learnt bodies under tools: error of force and torque on solves of their own, and the time of a tick beside a ball's.
+
+    python -m benchmarks.learnt_tools                     all cases, an hour or two on one core
+    python -m benchmarks.learnt_tools --case dome-punch   one of them, some minutes
+    python -m benchmarks.learnt_tools --folder solves     solves are kept in a folder, and taken from there
+    python -m benchmarks.learnt_tools --record            the table of record and the documentation's block, too
+
+Bodies are neo-Hookean, 9 kPa, ν 0.45: a block of 44 × 40 × 20 mm and a dome of radius 30 mm, 18 mm high. Pads have 6e6
+N/m³, elements under a tool are 4 mm long, presses 0.5 to 4 mm deep. Solves to judge by are at places, depths and angles
+of another seed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import palpate as pp
+from benchmarks.records import Record, renew
+from benchmarks.table import Claim, Column, Table
+from palpate.dataset import Dataset
+
+__all__ = ["CASES", "Case", "judge", "solves_of", "table"]
+
+RADIUS = 0.006  # m, of all tools
+DEPTHS = (0.0005, 0.004)  # m
+TICKS = 4000
+ANGLE_STEP = 1e-4  # rad, of the difference that gives a torque
+
+
+def _block() -> pp.Body:
+    block = pp.shapes.Block((0.044, 0.040, 0.02), element=0.015)
+    return pp.Body(block, pp.materials.NeoHookean(young=9e3, poisson=0.45))
+
+
+def _dome() -> pp.Body:
+    dome = pp.shapes.Dome(radius=0.03, height=0.018, element=0.012)
+    return pp.Body(dome, pp.materials.NeoHookean(young=9e3, poisson=0.45))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A body under a tool: what is solved, and what must be reached."""
+
+    words: str
+    body: Callable[[], pp.Body]
+    shape: pp.tools.Tool
+    options: tuple[tuple[str, Any], ...] = ()
+    solves: tuple[int, int] = (40, 20)  # to learn from, and to judge by
+    depths: int = 4  # in a series to learn from
+    bounds: tuple[float, float] = (0.01, 0.02)  # of the force's error: median, 95th percentile
+
+    def problem(self) -> Any:
+        """Return the problem."""
+        tool = pp.SurfaceTool(self.shape, depth=DEPTHS, pad=6e6, element=0.004, **dict(self.options))
+        return self.body().problem(tool)
+
+
+OVER = (("over", ((0.018, 0.016), (0.026, 0.024))),)
+CAPSULE, PUNCH = pp.tools.Capsule(RADIUS, 0.020), pp.tools.Punch(RADIUS, 0.002)
+CASES = {
+    "block-sphere": Case("sphere on a block", _block, pp.tools.Sphere(RADIUS), OVER),
+    "block-capsule": Case("capsule on a block", _block, CAPSULE, OVER),
+    "block-punch": Case("punch on a block", _block, PUNCH, OVER),
+    "dome-sphere": Case("sphere on a dome", _dome, pp.tools.Sphere(RADIUS)),
+    "dome-capsule": Case("capsule on a dome", _dome, CAPSULE),
+    "dome-punch": Case("punch on a dome", _dome, PUNCH),
+    "block-capsule-axis": Case(
+        "capsule on a block, its axis an input, to 20°",
+        _block,
+        CAPSULE,
+        (*OVER, ("turns", "axis"), ("tilt", math.radians(20))),
+        solves=(120, 40),
+        depths=3,
+        bounds=(math.inf, 0.035),
+    ),
+}
+
+
+def solves_of(name: str, folder: Path) -> tuple[Dataset, Dataset]:
+    """Return the solves of a case to learn from and to judge by, from a folder or made anew and kept there."""
+    case, paths = CASES[name], [folder / f"{name}-{part}" for part in ("train", "test")]
+    problem = case.problem()
+    learnt, judged = case.solves
+    every = problem.design(4 * judged, 9, depths=4)
+    some = np.random.default_rng(7).permutation(4 * judged)[:judged]
+    designs = problem.design(learnt, 1, depths=case.depths), every[some]
+    found = [
+        Dataset.open(path) if path.exists() else pp.sweep(problem, points=points, workers=1, path=path)
+        for path, points in zip(paths, designs, strict=True)
+    ]
+    return found[0], found[1]
+
+
+def judge(name: str, train: Dataset, test: Dataset, effort: float) -> dict[str, Any]:
+    """Return a row of the table: what a body learnt from some solves misses of others."""
+    test = test.ok
+    body = pp.learn(train, effort=effort, shape=False, workers=1)[0]
+    energy, force = body.hand_energy, test.response[:, :3]
+    size = np.linalg.norm(force, axis=1)
+    error = np.linalg.norm(energy.force(test.X) - force, axis=1) / size
+    row = {
+        "case": CASES[name].words,
+        "solves": len(train.ok),
+        "judged": len(test),
+        "median": 100 * float(np.median(error)),
+        "p95": 100 * float(np.quantile(error, 0.95)),
+        "worst": 100 * float(error.max()),
+        "tick": _tick(energy, test.X),
+    }
+    angles = test.X.shape[1] - 3
+    if angles:
+        steps = ANGLE_STEP * np.eye(test.X.shape[1])[3:]
+        up, down = (np.array([energy.energy(test.X + sign * s) for s in steps]).T for sign in (1, -1))
+        off = np.linalg.norm(-(up - down) / (2 * ANGLE_STEP) - test.response[:, 3:], axis=1)
+        row["torque"] = 100 * float(np.quantile(off / (size * RADIUS), 0.95))
+    elif "torque" in test and body.torque_evaluator is not None:
+        off = np.linalg.norm(body.torque(test.X) - test["torque"], axis=1)
+        row["torque"] = 100 * float(np.quantile(off / (size * RADIUS), 0.95))
+    return row
+
+
+def _tick(energy: Any, X: np.ndarray) -> float:
+    """Return the 99th percentile in µs of an answer at places (N, n), of the quieter half of the time."""
+    evaluator, spent = energy.evaluator(), []
+    rows = [(x[:3].copy(), x[3:].copy()) for x in X]
+    for k in range(TICKS):
+        position, parameters = rows[k % len(rows)]
+        began = time.perf_counter()
+        evaluator(position, parameters)
+        spent.append(1e6 * (time.perf_counter() - began))
+    parts = np.array(spent).reshape(20, -1)
+    return float(np.quantile(parts[np.argsort(parts.mean(axis=1))[:10]], 0.99))
+
+
+def table(rows: dict[str, dict[str, Any]]) -> Table:
+    """Return the table of the rows of some cases."""
+    claims = []
+    for name, row in rows.items():
+        for key, what, bound in zip(
+            ("median", "p95"), ("median", "95th percentile"), CASES[name].bounds, strict=True
+        ):
+            if math.isfinite(bound):
+                words = f"{row['case']}: force, {what}, % off"
+                claims.append(Claim(words, (row[key],), 100 * bound, ".2g"))
+        claims.append(Claim(f"{row['case']}: an answer, 99th percentile, µs", (row["tick"],), 60.0, ".2g"))
+    return Table(
+        "learnt_tools",
+        "Learnt bodies under tools, judged by solves at places of their own",
+        [
+            Column("case", "case"),
+            Column("solves", "solves", "d"),
+            Column("judged", "judged by", "d"),
+            Column("median", "force off, %: median", ".2f"),
+            Column("p95", "95th percentile", ".2f"),
+            Column("worst", "worst", ".2f"),
+            Column("torque", "torque off, % of ‖F‖ R, 95th percentile", ".2f"),
+            Column("tick", "an answer, µs, 99th percentile", ".0f"),
+        ],
+        list(rows.values()),
+        claims,
+    )
+
+
+def main(arguments: list[str]) -> int:
+    """Measure the cases that are asked for, and print their table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--case", choices=CASES, action="append")
+    parser.add_argument("--folder", type=Path, help="where solves are kept")
+    parser.add_argument("--effort", type=float, default=0.2, help="of the learning")
+    parser.add_argument("--record", action="store_true")
+    options = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as passing:
+        folder = options.folder or Path(passing)
+        rows = {}
+        for name in options.case or CASES:
+            rows[name] = judge(name, *solves_of(name, folder), options.effort)
+            print(rows[name], file=sys.stderr, flush=True)
+    found = Record.of(table(rows))
+    print(found.markdown())
+    if options.record:
+        found.write("learnt_tools")
+        renew()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -113,7 +113,6 @@ FACTS = PartFacts(
     whole=False,
     materials=(MaterialInfo("fat", "soft", "tissue", "3.3 kPa", "0.45"),),
     laws=("neo-hookean",),
-    regions=(),
     tools=(ToolInfo("capsule", "a bar", (SizeInfo("radius", "radius", "6 mm"),)),),
     regions=(RegionInfo("fat", "5 kPa..30 kPa"),),
     choices=dataclasses.asdict(WISH),

@@ -306,7 +306,7 @@ def _newton(
         weak = np.linalg.norm(jacobian, axis=(1, 2)) < FLAT
         move[weak] = 0.0
         step[rows] = move
-    return np.clip(step, -0.5, 0.5)
+    return np.asarray(np.clip(step, -0.5, 0.5))
 
 
 def _halve(points: np.ndarray, quads: np.ndarray) -> np.ndarray:

@@ -313,10 +313,9 @@ class Surrogate:
         if not self.can_be_touched:
             return self.card()._repr_html_()
         try:
-            page = self.to_html()
+            source = html.escape(self.to_html(), quote=True)
         except UsageError:
             return None
-        source = html.escape(page, quote=True)
         return (
             f'<iframe srcdoc="{source}" title="{html.escape(self.name, quote=True)}" '
             'sandbox="allow-scripts allow-downloads" style="width: 100%; height: 640px; border: 0"></iframe>'
@@ -349,7 +348,7 @@ class Surrogate:
             `palpate.learning.plastic.learn_indentation`; None for a body that forgets.
         spacing : float, optional
             How far apart the places of the surface are that remember, m, a quarter of the probe's radius for example;
-            without it the memory is kept where it says, by default at one place that travels with it.
+            without it the memory is kept where it says.
 
         Raises
         ------
@@ -387,9 +386,8 @@ class Surrogate:
     ) -> Surrogate:
         """Return the same body under a tool that sticks and slides, in the loop, on the page and in exports.
 
-        The coefficients of a tool that slides and of one at rest are pure numbers, such as 0.3 for a dry tool on
-        silicone; the static one is at least the kinetic one, which it is by default. `ratio`, in (0, 1], is the tangential
-        over the normal stiffness while it sticks, by default Mindlin's for ν = ½.
+        The coefficients are pure numbers, such as 0.3; that of a tool at rest is by default that of one that slides.
+        `ratio`, in (0, 1], is tangential over normal stiffness: by default Mindlin's for ν = ½.
 
         Raises
         ------

@@ -11,7 +11,7 @@ import tooled
 from palpate.devices import Sample
 from palpate.devices.device import Traits
 from palpate.devices.trace_file import read_trace
-from palpate.errors import DeviceLostError
+from palpate.errors import DeviceLostError, UsageError
 from palpate.runtime import Fault
 from palpate.runtime.hand_turn import LEVER, rotation_of
 from palpate.runtime.loop import Loop
@@ -66,12 +66,12 @@ class Wrist:
 class Bench:
     """A loop around a wrist and a body; `press` and `turn` lead the hand evenly."""
 
-    def __init__(self, body, shared, device=None, *, stiffness=0.0, recorder=None):
+    def __init__(self, body, shared, device=None, *, stiffness=0.0, recorder=None, limit=math.inf):
         self.body, self.device, self.now = touchable(body), device or Wrist(), 0.0
         traits = self.device.traits
         self.loop = Loop(
-            self.body, self.device, shared, self.body.workspace(traits.radius), Limits(traits.max_force),
-            stiffness=stiffness, recorder=recorder,
+            self.body, self.device, shared, self.body.workspace(traits.radius),
+            Limits(traits.max_force, max_torque=limit), stiffness=stiffness, recorder=recorder,
         )  # fmt: skip
         self.w, self.at = np.zeros(3), 0.01 * UP
         self.device.sample.position[:] = self.at
@@ -136,6 +136,15 @@ def test_the_torque_is_the_tools_in_the_devices_axes(body, shared):
     x, y, z = body.torque(place[None])[0] / bench.loop.workspace.scale
     # the body's z is up, its y away from the user
     np.testing.assert_allclose(bench.torques[-1], [-y, x, z], rtol=1e-6, atol=1e-9)
+
+
+def test_a_limit_of_torque_below_the_devices_own_holds(body, shared):
+    bench = Bench(body, shared, limit=0.2 * MOST)
+    bench.press()
+    bench.run(200)
+    assert np.linalg.norm(bench.torques, axis=1).max() == pytest.approx(0.2 * MOST)
+    with pytest.raises(UsageError, match="torque limit of -1 N m"):
+        Limits(1.0, max_torque=-1.0)
 
 
 def test_a_device_without_motors_in_its_wrist_is_given_forces_alone(body, shared):

@@ -17,6 +17,7 @@ from palpate.export.check_engine import CheckEngine, engine_library
 from palpate.export.fmu_export import export_fmu
 from palpate.export.lib_export import export_lib
 from palpate.export.onnx_export import export_onnx
+from palpate.export.umbridge_server import served_models
 from palpate.export.wasm_core import WasmCore
 from palpate.runtime.touchable import touchable
 from palpate.surrogates.learnt_torque import TurnEvaluator, torque_of_slopes
@@ -205,3 +206,25 @@ def test_the_generic_core_knows_tools_in_any_pose():
     X = np.random.default_rng(0).uniform(low, high, (30, len(low)))
     torque = body.torque(X)
     np.testing.assert_allclose(WasmCore.of(block).torques(X), torque, atol=1e-9 * np.abs(torque).max())
+
+
+def test_um_bridge_serves_the_torque_without_slopes(body):
+    model, x = served_models(body)["torque"], pressed.places(1)[0]
+    np.testing.assert_allclose(model.value(x), body.torque(x[None])[0], rtol=1e-12)
+    assert model.support == {
+        "Evaluate": True,
+        "Gradient": False,
+        "ApplyJacobian": False,
+        "ApplyHessian": False,
+    }
+    assert "torque" not in served_models(pressed.surrogate())
+
+
+def test_a_validation_says_how_far_the_torque_is_off(body):
+    X = pressed.places(40, seed=3)
+    acting = {"type": "SurfaceTool", "touches": "top", "depth": (0.0, 0.006), **tooled.TOOL.describe()}
+    data = pressed.dataset(pressed.solves(X), acting=acting, torque=1.01 * tooled.torque(X))
+    figure = pp.validate(body, data).torque
+    off = 0.01 * np.linalg.norm(tooled.torque(X), axis=1) / np.linalg.norm(pressed.force(X), axis=1)
+    heavy = np.linalg.norm(pressed.force(X), axis=1) > 0.05 * np.linalg.norm(pressed.force(X), axis=1).max()
+    assert figure.median == pytest.approx(np.median(off[heavy]) / tooled.TOOL.shape.size, rel=1e-6)

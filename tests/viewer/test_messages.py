@@ -13,6 +13,7 @@ import pytest
 import palpate.viewer
 from palpate.errors import UsageError
 from palpate.viewer import typescript
+from palpate.viewer.exam_messages import ExamMark, ExamNews, ExamWish, FormerExam
 from palpate.viewer.messages import (
     PROTOCOL,
     DrawnTool,
@@ -131,6 +132,24 @@ PART = (
     LEARNING,
 )
 WRITTEN = (HELLO, PRESSED, SHOWN, Notice("what", "why", "fix"), NEWS, REASON, FEEL, *PART)
+
+MARK = ExamMark(1, (0.0, 0.25, 0.5), "hard", "", "No lump lies here.")
+EXAM = (
+    ExamNews(
+        PROTOCOL,
+        "an examination",
+        "words",
+        "practice",
+        "",
+        2.5,
+        (MARK,),
+        (),
+        (FormerExam("a", "b", "c", ended=True),),
+        "",
+    ),
+    ExamWish("mark", place=(0.0, 0.25, 0.5)),
+)
+WRITTEN += EXAM
 
 
 def sample(message: type[Binary]) -> Binary:

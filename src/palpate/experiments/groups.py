@@ -121,7 +121,7 @@ def _tost(mu: np.ndarray, jnd: np.ndarray, margin: float) -> np.ndarray:
         error = values.std(axis=1, ddof=1) / math.sqrt(n)
         return np.asarray(student.sf(values.mean(axis=1) / np.maximum(error, 1e-300), n - 1))
 
-    return np.maximum(p_above(mu + margin * jnd), p_above(margin * jnd - mu))
+    return np.asarray(np.maximum(p_above(mu + margin * jnd), p_above(margin * jnd - mu)))
 
 
 def power_curve(

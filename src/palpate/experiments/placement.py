@@ -32,7 +32,9 @@ _REVERSALS = 4  # that a staircase's estimate leaves out, while it still comes d
 class Placement(Protocol):
     """The contract of a placement over levels (L,)."""
 
-    levels: np.ndarray
+    @property
+    def levels(self) -> np.ndarray:
+        """Levels (L,), rising."""
 
     def start(self, people: int, rng: np.random.Generator) -> Any:
         """Return the state of so many people before the first trial."""

@@ -88,7 +88,7 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
             options=field,
             drawn=pressed.drawn,
             shift=pressed.shift,
-            tool=(pressed.tool or "") if pressed.posed else "",
+            tool=pressed.tool if pressed.posed else None,
         )
 
     own, options = request.split("law", "length", "deviation")

@@ -338,11 +338,11 @@ class _Record:
         return value
 
     def _optional(self, name: str) -> bool:
-        """Return whether a file may lack a field: one that may be nothing, an empty mapping, or a tuple by default."""
+        """Return whether a file may lack a field: by default nothing, an empty mapping, a tuple or a text."""
         if isinstance(self.forms[name], _ByName):
             return self.cls.__dataclass_fields__[name].default_factory is dict  # type: ignore[attr-defined]
         default = getattr(self.cls, name, 0)
-        return isinstance(default, tuple) or (isinstance(self.forms[name], _Maybe) and default is None)
+        return isinstance(default, tuple | str) or (isinstance(self.forms[name], _Maybe) and default is None)
 
     def _worth_sharing(self) -> bool:
         return not all(isinstance(form, _Scalar) for form in self.forms.values())

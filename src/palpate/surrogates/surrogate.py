@@ -313,10 +313,9 @@ class Surrogate:
         if not self.can_be_touched:
             return self.card()._repr_html_()
         try:
-            page = self.to_html()
+            source = html.escape(self.to_html(), quote=True)
         except UsageError:
             return None
-        source = html.escape(page, quote=True)
         return (
             f'<iframe srcdoc="{source}" title="{html.escape(self.name, quote=True)}" '
             'sandbox="allow-scripts allow-downloads" style="width: 100%; height: 640px; border: 0"></iframe>'
@@ -349,7 +348,7 @@ class Surrogate:
             `palpate.learning.plastic.learn_indentation`; None for a body that forgets.
         spacing : float, optional
             How far apart the places of the surface are that remember, m, a quarter of the probe's radius for example;
-            without it the memory is kept where it says, by default at one place that travels with the probe.
+            without it the memory is kept where it says.
 
         Raises
         ------
@@ -387,24 +386,17 @@ class Surrogate:
     ) -> Surrogate:
         """Return the same body under a tool that sticks and slides, in the loop, on the page and in exports.
 
-        Parameters
-        ----------
-        kinetic : float
-            Coefficient of friction of a tool that slides, a pure number; 0.3 for a dry tool on silicone, 0.05 for a
-            wet one on tissue, 0 for none.
-        static : float, optional
-            The same of a tool at rest, at least the kinetic one, which it is by default.
-        ratio : float
-            Tangential over normal stiffness of the contact while it sticks, in (0, 1]; by default Mindlin's for an
-            incompressible body, 2(1 − ν)/(2 − ν) = 2/3.
+        The coefficients are pure numbers, such as 0.3; that of a tool at rest is by default that of one that slides.
+        `ratio`, in (0, 1], is tangential over normal stiffness: by default Mindlin's for ν = ½.
 
         Raises
         ------
         UsageError
             For a negative coefficient, a kinetic one above the static one, or a body that is held.
         """
-        memory = with_friction(self.hand_energy, self.memory, kinetic, static, ratio=ratio)
-        return replace(self, memory=memory)
+        return replace(
+            self, memory=with_friction(self.hand_energy, self.memory, kinetic, static, ratio=ratio)
+        )
 
     def follow(self, X: np.ndarray, times: np.ndarray | None = None) -> Followed:
         """Return what the body answers along a history that begins before anything was done to it.

@@ -17,6 +17,7 @@ import numpy as np
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import Field, FieldSurrogate
+from palpate.surrogates.baselines import PosedBaseline
 from palpate.surrogates.fields import surface_fields
 from palpate.viewer.indentation_drawing import IndentationDrawing
 from palpate.viewer.messages import FieldInfo, Modes, Surface
@@ -95,7 +96,9 @@ class SurfaceDrawing:
 
         `held` says whether a hand holds or presses the body; `parameters` (p,) are the inputs that it doesn't supply.
         """
-        touched = held and not state.let_go
+        # a field knows a ball's depth alone: whether a tool in any pose touches, the loop says
+        away = self.body.energy.baseline.name == PosedBaseline.name and state.depth <= 0.0
+        touched = held and not state.let_go and not away
         deviation = self._judge.trust(state.position, parameters) if touched else 0.0
         if self.body.holds:
             return {

@@ -76,7 +76,7 @@ def learn_snapshots(
     rest: np.ndarray | None = None,
     drawn: CarriedSurface | None = None,
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    tool: str = "",
+    tool: str | None = None,
     options: FieldOptions,
 ) -> LearntField:
     """Learn a field on a mesh from snapshots on the meshes that they were solved on; the context is `learn_field`'s.

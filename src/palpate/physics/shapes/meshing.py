@@ -151,7 +151,8 @@ def points_on(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
 def _points_inside(mesh: BodyMesh, refinement: FineMesh) -> tuple[np.ndarray, float]:
     """Points of a lattice in a box, and the area that would take as many elements as its volume (`require_budget`)."""
     low, high = mesh.corners
-    assert refinement.lower is not None and refinement.upper is not None  # or it were refused
+    assert refinement.lower is not None  # or it were refused
+    assert refinement.upper is not None
     lower, upper = np.maximum(np.array(refinement.lower), low), np.minimum(np.array(refinement.upper), high)
     spans = np.maximum(upper - lower, 0.0)
     require_budget([(float(np.prod(spans)), refinement.element)], [])

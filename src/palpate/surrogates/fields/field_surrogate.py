@@ -143,8 +143,8 @@ class FieldSurrogate(Field):
     shift : tuple of three floats
         Way in m from c to the centre of the ball whose depth counts: zero for a ball, the way from a tool's place.
         `surface` is the body's less that way.
-    tool : str
-        Description as JSON of a tool that turns, or presses a curved surface: then its balls tell the depth. Empty for
+    tool : str, optional
+        Description as JSON of a tool that turns, or presses a curved surface: then its balls tell the depth. None for
         a ball, and for a tool that one ball stands for.
 
     Raises
@@ -172,7 +172,7 @@ class FieldSurrogate(Field):
     meta: Mapping[str, Any] = field(default_factory=dict)
     drawn: CarriedSurface | None = None
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    tool: str = ""
+    tool: str | None = None
 
     def __post_init__(self) -> None:
         own_arrays(self, *_ARRAYS)

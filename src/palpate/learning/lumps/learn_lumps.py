@@ -18,11 +18,10 @@ from threadpoolctl import threadpool_limits
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.dataset_symmetry import declared_symmetry
-from palpate.learning.lumps.gaussian_surfaces import Samples, as_network, fit_surface, fit_widths
-from palpate.network.network import Scaling
+from palpate.learning.lumps.gaussian_surfaces import Samples, as_sum, fit_surface, fit_widths
 from palpate.surrogates.lumps.lump_contrast import LumpContrast, closed_form, contrast_inputs
 from palpate.surrogates.lumps.lump_room import LumpRoom, skin_of
-from palpate.units import Quantity, Range
+from palpate.units import Range
 
 __all__ = ["LEAST_CONTRAST", "LumpPresses", "change_errors", "learn_lumps"]
 
@@ -165,8 +164,8 @@ def learn_lumps(
 class _Shape:
     """What is chosen once, before presses are left out: scaling, distance exponent and widths."""
 
-    inputs: tuple[Range, ...]
-    scaling: Scaling
+    middle: np.ndarray
+    half: np.ndarray
     decay: float
     widths: np.ndarray
     soft_widths: np.ndarray
@@ -175,13 +174,7 @@ class _Shape:
     def of(cls, presses: LumpPresses) -> _Shape:
         Z, _, _ = _rows(presses)
         low, high = Z.min(axis=0), Z.max(axis=0)
-        names = ("c_x", "c_y", "c_z", "o_x", "o_y", "o_z", "ln r")
-        inputs = tuple(
-            Range(name, float(a), float(b), "" if name == "ln r" else "m")
-            for name, a, b in zip(names, low, high, strict=True)
-        )
-        scaling = Scaling.of(inputs, np.zeros((1, 1)), scale=1.0)
-        first = cls(inputs, scaling, 0.0, WIDTHS, WIDTHS)
+        first = cls((low + high) / 2.0, (high - low) / 2.0, 0.0, WIDTHS, WIDTHS)
         rows, groups = first.density_rows(presses)
         far = np.log(np.linalg.norm(Z[:, 3:6], axis=1))
         B = np.column_stack([np.ones(len(far)), rows.Z, far]) * np.sqrt(rows.weight)[:, None]
@@ -208,13 +201,13 @@ class _Shape:
         share = D / U
         weight = (share / (share + FELT)) ** 2
         # along a coordinate of the hand at a fixed lump: half ranges turn slopes into those by scaled inputs
-        half = self.scaling.input_half
+        half = self.half
         directions = np.vstack(
             [np.diag(half[:3].mean() / half[:3]), np.diag(-half[:3].mean() / half[3:6]), np.zeros((1, 3))]
         )
         reach = U / np.linalg.norm(presses.force[i], axis=1) / half[:3].mean()
         rows = Samples(
-            self.scaling.scale_inputs(Z), value, weight, slope * half[:3].mean(), directions, reach
+            (Z - self.middle) / self.half, value, weight, slope * half[:3].mean(), directions, reach
         )
         return rows, presses.groups[i]
 
@@ -225,7 +218,9 @@ class _Shape:
         i, j = index[few].T
         share = presses.density[i, j] / presses.energy[i]
         rows = Samples(
-            self.scaling.scale_inputs(Z[few]), np.log(presses.compliance[i, j]), (share / (share + FELT)) ** 2
+            (Z[few] - self.middle) / self.half,
+            np.log(presses.compliance[i, j]),
+            (share / (share + FELT)) ** 2,
         )
         return rows, presses.groups[i]
 
@@ -233,10 +228,7 @@ class _Shape:
         """Return the contrast learnt from presses, with a given k."""
         dense = fit_surface(self.density_rows(presses)[0], self.widths, units)
         soft = fit_surface(self.compliance_rows(presses)[0], self.soft_widths, min(units, FEWER_UNITS))
-        density, compliance = (
-            as_network(surface, self.inputs, Quantity(name), self.scaling)
-            for surface, name in ((dense, "ln(D/U), its closed form apart"), (soft, "ln beta"))
-        )
+        density, compliance = (as_sum(surface, self.middle, self.half) for surface in (dense, soft))
         return LumpContrast(density, compliance, self.decay, k, presses.room)
 
 

@@ -103,7 +103,8 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
     rivals = None if options.get("choose") is False else pressed.overlap_baselines
     mirror = {"matrices": pressed.matrices, "about": pressed.about}
     learn = partial(learn_arm, pressed.data, pressed.inputs, **mirror)
-    numbers = {} if pressed.tool is None else {ARM: learn}
+    # of a tool that turns the energy tells the torque
+    numbers = {} if pressed.tool is None or pressed.angles else {ARM: learn}
     return Recognised(
         baseline,
         pressed.solves,

@@ -97,21 +97,10 @@ KINDS = {
 
 
 def ready_plan(kind: str, name: str, bodies: Sequence[str | Path]) -> str:
-    """Return the text of a plan.
+    """Return the text of a plan of a kind of `KINDS`, with the experiment's name in letters and digits.
 
-    Parameters
-    ----------
-    kind : str
-        A word of `KINDS`.
-    name : str
-        Name of the experiment, letters and digits.
-    bodies : sequence of path
-        Files of learnt bodies, the reference first; of discrimination one is enough.
-
-    Raises
-    ------
-    UsageError
-        If the kind is unknown, or a file is missing from the list.
+    `bodies` are files of learnt bodies, the reference first; of discrimination one is enough. An unknown kind, or a
+    file too few, is a UsageError.
     """
     kind = checks.one_of("The kind of plan", kind, tuple(KINDS))
     files = [str(b) for b in bodies]

@@ -149,7 +149,7 @@ def _parts(study: Study) -> tuple[PartRecord, ProbeRecord | ToolRecord]:
         raise UsageError(
             f"The study {study.name} is not of a part under a ball or a tool.",
             why="Only such a study is set up on the page.",
-            fix="Carry it out with `palpate study`, and look at it with `palpate view`.",
+            fix="Carry it out with `palpate sweep` and `palpate learn`, and look at it with `palpate view`.",
         )
     return body, acting
 

@@ -47,6 +47,27 @@ def test_a_ready_plan_is_a_plan_and_a_sitting_goes_on_from_its_answers(kind, tmp
     assert second.next() is None
 
 
+def test_a_sitting_does_not_go_on_from_answers_to_other_trials(folder):
+    files = run_through(folder, "01", count=6)
+    rows = files.rows()
+    Sitting(folder.plan, "sub-01").restore(rows)
+    rows[5]["level"] = str(float(rows[5]["level"]) + 0.05)
+    with pytest.raises(UsageError, match="can't go on"):
+        Sitting(folder.plan, "sub-01").restore(rows)
+    with pytest.raises(UsageError, match="of its table is of another trial"):
+        Sitting(folder.plan, "sub-02").restore(rows)
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path):
+    file = write_plan(tmp_path)
+    (tmp_path / "trial").mkdir()
+    (tmp_path / "trial" / "dataset_description.json").write_text("{}")
+    (tmp_path / "trial" / "participants.tsv").write_text("participant_id\tage\nsub-01\t30\n")
+    with pytest.raises(UsageError, match=r"participants\.tsv, and nothing is ever overwritten"):
+        StudyFolder.beside(file).prepare(file)
+    assert (tmp_path / "trial" / "dataset_description.json").read_text() == "{}"
+
+
 def test_people_differ_and_runs_differ(tmp_path):
     plan = read_plan(write_plan(tmp_path))
     courses = []
@@ -130,6 +151,8 @@ def test_a_line_that_a_kill_cut_off_is_left_out(folder):
     whole = files.table.read_bytes()
     with files.table.open("ab") as table:
         table.write(b"3.2\t1.0\t1\t8\ttri")
+    analyse(folder)  # it does not change the file
+    assert files.table.read_bytes() != whole
     assert len(files.rows()) == 7
     assert files.table.read_bytes() == whole
 
@@ -145,12 +168,17 @@ def test_nothing_is_overwritten(folder, tmp_path):
     changed = write_plan(tmp_path, change=("trials = 80", "trials = 60"))
     with pytest.raises(UsageError, match="has changed since the first sitting"):
         folder.prepare(changed)
+    run_through(folder, "x1", count=1)
+    with pytest.raises(UsageError, match="case"):
+        folder.sitting(Participant("X1"), 1)
 
 
 def test_two_programs_do_not_run_one_sitting(folder):
     files = run_through(folder, "01", count=3)
     with files.held(), pytest.raises(UsageError, match="another process"), files.held():
         pass
+    with files.held(), pytest.raises(UsageError, match="being run"):
+        folder.forget(Participant("sub-01"))
     with files.held():
         pass
 

@@ -168,7 +168,9 @@ def analyse_folder(plan: PlanFile, as_json: Json = False) -> None:
     from palpate.experiments.analysis import analyse
     from palpate.experiments.study_folder import StudyFolder
 
-    analysis = analyse(StudyFolder.beside(plan))
+    folder = StudyFolder.beside(plan)
+    folder.require_plan(plan)
+    analysis = analyse(folder)
     Console(as_json).result(str(analysis), analysis.as_dict())
 
 

@@ -22,7 +22,8 @@ class Simulated:
 
     Coverages are shares of the people whose 95 % interval holds the truth. `bias` is that of the JND's geometric mean,
     as a share; of the form ``correct`` JND stands for σ. `location_bias` and `width` are in the levels' unit and as
-    ln(upper/lower); `reversals_bias` is that of a staircase's mean reversal.
+    ln(upper/lower); `reversals_bias` is that of a staircase's mean reversal, of the
+    form ``correct`` as a share of what the levels are logarithms of.
     """
 
     people: int
@@ -118,7 +119,6 @@ def _reversals_bias(course: Course, state: Progress, observer: Observer) -> floa
     guess = 0.5 if course.function.form == "signed" else float(np.mean(course.function.guess))
     reached = stairs.threshold(state.placed)
     if course.function.form == "signed":  # with no bias, p correct = Φ(|x|/σ)
-        true = observer.spread * float(ndtri(stairs.target))
-    else:
-        true = observer.location + observer.spread * float(ndtri((stairs.target - guess) / (1.0 - guess)))
-    return float(np.nanmean(reached) / true - 1.0)
+        return float(np.nanmean(reached) / (observer.spread * float(ndtri(stairs.target))) - 1.0)
+    true = observer.location + observer.spread * float(ndtri((stairs.target - guess) / (1.0 - guess)))
+    return float(np.expm1(np.nanmean(reached) - true))  # levels are logarithms: their ratio has no meaning

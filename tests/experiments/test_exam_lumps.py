@@ -47,12 +47,10 @@ def test_what_a_schematic_lump_adds_is_the_formula_above_it_and_nothing_far_away
 
 
 def test_the_deviation_of_the_force_does_not_tell_whether_there_are_lumps():
-    body, known = pressed.surrogate(), []
-    energy = body.hand_energy
-    body = body.with_energy(replace(energy, root=np.eye(energy.network.units)))
+    energy = pressed.surrogate().hand_energy
+    body = pressed.surrogate().with_energy(replace(energy, root=np.eye(4 + energy.network.units)))
     for lumps in ([], [LUMP]):
-        known.append(body_with_lumps(body, slab(), lumps).hand_energy.root)
-    assert known == [None, None]
+        assert body_with_lumps(body, slab(), lumps).hand_energy.root is None
 
 
 def test_the_signal_is_half_as_strong_beside_a_lump_where_boussinesq_has_it():

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from palpate.cli.experiment_commands import write_plan as write_the_plan
 from palpate.errors import FileFormatError, StudyError, UsageError
 from palpate.experiments import analyse, read_plan
 from palpate.experiments.ready_plans import KINDS, ready_plan
@@ -66,6 +68,19 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path):
     with pytest.raises(UsageError, match=r"participants\.tsv, and nothing is ever overwritten"):
         StudyFolder.beside(file).prepare(file)
     assert (tmp_path / "trial" / "dataset_description.json").read_text() == "{}"
+
+
+def test_a_plan_names_bodies_from_where_it_lies(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    bodies = [tmp_path / "whole.palpate", Path("models") / "other.palpate"]
+    (tmp_path / "plans").mkdir()
+    file = Path("plans") / "trial.toml"
+    write_the_plan(bodies, "discrimination", "trial", file, show=False)
+    plan = read_plan(file)
+    for named, body in zip((plan.reference, plan.comparison[0].file), bodies, strict=True):
+        assert (file.parent / named).resolve() == body.resolve()
+    with pytest.raises(UsageError, match="letters and digits"):
+        write_the_plan(bodies, "discrimination", "my trial", None, show=False)
 
 
 def test_people_differ_and_runs_differ(tmp_path):

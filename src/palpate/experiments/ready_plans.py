@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -111,9 +112,15 @@ def ready_plan(kind: str, name: str, bodies: Sequence[str | Path]) -> str:
     Raises
     ------
     UsageError
-        If the kind is unknown, or a file is missing from the list.
+        If the kind is unknown, the name has other signs, or a file is missing from the list.
     """
     kind = checks.one_of("The kind of plan", kind, tuple(KINDS))
+    if not re.fullmatch("[A-Za-z0-9]+", name):
+        raise UsageError(
+            f"{name!r} is no name of an experiment.",
+            why="It stands in the names of files, of which BIDS asks for letters and digits alone.",
+            fix="Give a name such as stiffness or kidney2.",
+        )
     files = [str(b) for b in bodies]
     if kind == "discrimination" and len(files) == 1:
         files *= 2

@@ -37,7 +37,8 @@ class Simulated:
     caught : float, optional
         Share of the catch trials that were answered rightly; None without any.
     reversals_bias : float, optional
-        Bias of a staircase's mean reversal, as a share; None of another placement.
+        Bias of a staircase's mean reversal, as a share, of the form ``correct`` of what the levels are logarithms of;
+        None of another placement.
     """
 
     people: int
@@ -147,7 +148,6 @@ def _reversals_bias(course: Course, state: Progress, observer: Observer) -> floa
     guess = 0.5 if course.function.form == "signed" else float(np.mean(course.function.guess))
     reached = stairs.threshold(state.placed)
     if course.function.form == "signed":  # with no bias, p correct = Φ(|x|/σ)
-        true = observer.spread * float(ndtri(stairs.target))
-    else:
-        true = observer.location + observer.spread * float(ndtri((stairs.target - guess) / (1.0 - guess)))
-    return float(np.nanmean(reached) / true - 1.0)
+        return float(np.nanmean(reached) / (observer.spread * float(ndtri(stairs.target))) - 1.0)
+    true = observer.location + observer.spread * float(ndtri((stairs.target - guess) / (1.0 - guess)))
+    return float(np.expm1(np.nanmean(reached) - true))  # levels are logarithms: their ratio has no meaning

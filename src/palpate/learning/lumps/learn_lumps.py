@@ -248,13 +248,14 @@ def _rows(presses: LumpPresses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _curvature(presses: LumpPresses) -> float:
     """Return the constant k that fits the presses solved with a lump best; 0 where there are few."""
-    rows = np.flatnonzero(np.isfinite(presses.added))
+    rows = np.flatnonzero(np.isfinite(presses.added) & (presses.ratio != 1.0))
     if len(rows) < FEWEST:
         return 0.0
     x, beta = presses.ratio[rows] - 1.0, presses.compliance[rows, 0]
     s = beta * x / (1.0 + beta * x)
-    missed = np.log(presses.added[rows] * (1.0 + beta * x) / (x * presses.density[rows, 0]))
-    return float((s**2 @ missed) / (s**2 @ s**2))
+    beside = presses.added[rows] * (1.0 + beta * x) / (x * presses.density[rows, 0])
+    weight = np.where(beside > 0, s**2, 0.0)  # a change below the solves' own error may have either sign
+    return float((weight @ np.log(np.where(beside > 0, beside, 1.0))) / max(weight @ weight, 1e-300))
 
 
 def _left_out_errors(presses: LumpPresses, shape: _Shape, k: float, units: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What presses a part: a ball, or a tool in sizes that suit the part, and the tables of its study under either."""
+"""The tool that presses a part: a ball, or one in sizes that suit it, and the tables of its study under either."""
 
 from __future__ import annotations
 

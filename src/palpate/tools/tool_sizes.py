@@ -112,11 +112,7 @@ def read_tool(text: str, radius: float, known: PosedTool | None = None) -> tuple
     """Return name and tool of a text such as ``capsule, radius 6 mm, length 24 mm``; no tool for a ball.
 
     Sizes that are left out go with a ball of a radius in m, or are those of a `known` tool of this shape.
-
-    Raises
-    ------
-    UsageError
-        For a name or a size that is not known, or a text that is no quantity.
+    A name or a size that is not known, or a text that is no quantity, is a UsageError.
     """
     name, *parts = (part.strip() for part in text.replace(":", ",").replace(";", ",").split(","))
     name = name.lower()

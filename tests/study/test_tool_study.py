@@ -185,6 +185,16 @@ def test_a_tool_of_a_file_lies_beside_its_study(tmp_path: Path):
     assert read_study(again) == study
 
 
+def test_the_page_of_a_part_shows_a_tool_from_a_file_without_sizes(part: Path, tmp_path: Path):
+    trimesh.creation.icosphere(subdivisions=2, radius=8.0).export(tmp_path / "tip.stl")
+    study = part_study(part, tool="capsule")[0]
+    content = study.model_dump()
+    content["interaction"]["shape"] = {"kind": "file", "file": str(tmp_path / "tip.stl"), "unit": "mm"}
+    facts = shown_part(Study.model_validate(content)).facts()
+    (own,) = (tool for tool in facts.tools if tool.name == facts.choices["tool"])
+    assert [size.name for size in own.sizes] == ["turn_x", "turn_y", "turn_z"]
+
+
 def test_a_tool_whose_file_is_missing_is_refused(tmp_path: Path):
     with pytest.raises(UsageError, match=r"ball\.stl"):
         read(tmp_path, '[interaction.shape]\nkind = "file"\nfile = "ball.stl"\nunit = "mm"\n')

@@ -14,6 +14,7 @@ from palpate.errors import UsageError
 from palpate.tools.edged_tools import Box, Cylinder, Punch
 from palpate.tools.posed_tool import PosedTool
 from palpate.tools.round_tools import Capsule, Cone, Fingertip, Sphere
+from palpate.tools.scanned_tool import ScannedTool
 from palpate.tools.tool_shape import Tool
 from palpate.units import parse_quantity
 
@@ -69,8 +70,11 @@ def size_unit(size: str) -> str:
 
 
 def sizes_of(tool: PosedTool) -> dict[str, float]:
-    """Return the sizes of a tool by their names, in m and rad."""
-    own = {field.name: float(getattr(tool.shape, field.name)) for field in fields(tool.shape)}  # type: ignore[arg-type]
+    """Return the sizes of a tool by their names, in m and rad; one from a file has those of its turn alone."""
+    shape = tool.shape
+    own = {}
+    if not isinstance(shape, ScannedTool):
+        own = {field.name: float(getattr(shape, field.name)) for field in fields(shape)}  # type: ignore[arg-type]
     return own | dict(zip(TURNS, tool.rotation, strict=True))
 
 

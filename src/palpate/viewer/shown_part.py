@@ -20,7 +20,6 @@ from palpate.tools.tool_sizes import (
     BALL,
     TURNS,
     USUAL,
-    about,
     size_unit,
     sizes_of,
     suitable_tool,
@@ -296,9 +295,10 @@ def _tools(choices: PartChoices) -> tuple[ToolInfo, ...]:
         own = choices.posed if name == choices.tool else None
         texts = _size_texts(own or suitable_tool(name, choices.radius))
         sizes = tuple(
-            SizeInfo(key, _title(key).removeprefix("The ").lower(), text) for key, text in texts.items()
+            SizeInfo(key, _title(key).removeprefix("The ").lower(), text)
+            for key, text in _size_texts(tool).items()
         )
-        tools.append(ToolInfo(name, about(name), sizes))
+        tools.append(ToolInfo(name, words, sizes))
     return tuple(tools)
 
 

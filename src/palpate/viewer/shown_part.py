@@ -291,9 +291,10 @@ def require_round_edge(tool: PosedTool) -> None:
 def _tools(choices: PartChoices) -> tuple[ToolInfo, ...]:
     """Return what can press a part, with sizes that suit it, or those that were chosen."""
     tools = [ToolInfo(BALL, "", ())]
-    for name in dict.fromkeys((*USUAL, choices.tool)) if choices.tool != BALL else USUAL:
-        own = choices.posed if name == choices.tool else None
-        texts = _size_texts(own or suitable_tool(name, choices.radius))
+    shapes = {name: (about(name), suitable_tool(name, choices.radius)) for name in USUAL}
+    if choices.posed is not None:  # one from a file is there only where the study has it
+        shapes[choices.tool] = (shapes.get(choices.tool, ("the study's own",))[0], choices.posed)
+    for name, (words, tool) in shapes.items():
         sizes = tuple(
             SizeInfo(key, _title(key).removeprefix("The ").lower(), text)
             for key, text in _size_texts(tool).items()

@@ -295,10 +295,9 @@ def _tools(choices: PartChoices) -> tuple[ToolInfo, ...]:
         own = choices.posed if name == choices.tool else None
         texts = _size_texts(own or suitable_tool(name, choices.radius))
         sizes = tuple(
-            SizeInfo(key, _title(key).removeprefix("The ").lower(), text)
-            for key, text in _size_texts(tool).items()
+            SizeInfo(key, _title(key).removeprefix("The ").lower(), text) for key, text in texts.items()
         )
-        tools.append(ToolInfo(name, words, sizes))
+        tools.append(ToolInfo(name, about(name), sizes))
     return tuple(tools)
 
 

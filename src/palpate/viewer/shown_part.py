@@ -297,10 +297,9 @@ def _tools(choices: PartChoices) -> tuple[ToolInfo, ...]:
         shapes[choices.tool] = (shapes.get(choices.tool, ("the study's own",))[0], choices.posed)
     for name, (words, tool) in shapes.items():
         sizes = tuple(
-            SizeInfo(key, _title(key).removeprefix("The ").lower(), text)
-            for key, text in _size_texts(tool).items()
+            SizeInfo(key, _title(key).removeprefix("The ").lower(), text) for key, text in texts.items()
         )
-        tools.append(ToolInfo(name, words, sizes))
+        tools.append(ToolInfo(name, about(name), sizes))
     return tuple(tools)
 
 

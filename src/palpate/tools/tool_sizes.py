@@ -61,7 +61,7 @@ _ABOUT = {
 
 def about(name: str) -> str:
     """Return what a tool is in a few words."""
-    return _ABOUT[name]
+    return _ABOUT.get(name, "a tool from a file, in the sizes that it has there")
 
 
 def size_unit(size: str) -> str:

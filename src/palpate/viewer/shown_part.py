@@ -20,7 +20,6 @@ from palpate.tools.tool_sizes import (
     BALL,
     TURNS,
     USUAL,
-    about,
     size_unit,
     sizes_of,
     suitable_tool,
@@ -292,10 +291,9 @@ def require_round_edge(tool: PosedTool) -> None:
 def _tools(choices: PartChoices) -> tuple[ToolInfo, ...]:
     """Return what can press a part, with sizes that suit it, or those that were chosen."""
     tools = [ToolInfo(BALL, "", ())]
-    shapes = {name: (about(name), suitable_tool(name, choices.radius)) for name in USUAL}
-    if choices.posed is not None:  # one from a file is there only where the study has it
-        shapes[choices.tool] = (shapes.get(choices.tool, ("the study's own",))[0], choices.posed)
-    for name, (words, tool) in shapes.items():
+    for name in dict.fromkeys((*USUAL, choices.tool)) if choices.tool != BALL else USUAL:
+        own = choices.posed if name == choices.tool else None
+        texts = _size_texts(own or suitable_tool(name, choices.radius))
         sizes = tuple(
             SizeInfo(key, _title(key).removeprefix("The ").lower(), text) for key, text in texts.items()
         )

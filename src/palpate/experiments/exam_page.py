@@ -12,6 +12,7 @@ import contextlib
 import logging
 import secrets
 import threading
+import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -63,6 +64,9 @@ MOST_PAGES = 8  # pages that are served at a time
 MESSAGES, MESSAGES_AT_ONCE = 10.0, 40.0  # of a page, per second and at once
 _DRAWS = 20  # of lumps for a practice; four in five have some
 _FORMER = 30  # examinations that the page lists
+_SETTLE = (
+    5.0  # s until a body with learnt lumps is felt: making it takes longer with each lump, which would tell
+)
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"  # of a score
 
 
@@ -232,7 +236,7 @@ class ExamPage(LocalServer):
         self._practice = None
 
     def _examine(self, _: ExamWish) -> None:
-        seed = self._seed
+        seed, begun = self._seed, time.monotonic()
         lumps = self._draw(seed) if self._lumps is None else self._lumps
         exam = Examination.begin(
             self.directory,
@@ -247,6 +251,8 @@ class ExamPage(LocalServer):
         self._seed += 1
         try:
             self._feel(lumps, exam.felt)
+            if self._surrogate.lumps is not None:
+                time.sleep(max(0.0, begun + _SETTLE - time.monotonic()))
             self._take(exam)
         except BaseException:
             exam.close()

@@ -40,7 +40,7 @@ _BEYOND = 1.5  # of the guided depth: how far the page's hand reaches
 
 @dataclass
 class _Touch:
-    """What happened in one interval."""
+    """A touch of one interval."""
 
     presses: int = 0
     force: float = 0.0

@@ -145,6 +145,6 @@ class Sitting:
 
     @property
     def break_is_due(self) -> bool:
-        """Whether a break comes before the next trial."""
+        """True where a break comes before the next trial."""
         counted = self._done - self.plan.sitting.practice
         return 0 < counted < len(self._mix) and counted % self.plan.sitting.break_every == 0

@@ -24,30 +24,15 @@ SEARCHED = 260, 1500  # units and rows, at most, in the search of widths
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Values and slopes of one function, scaled.
+    """Values and slopes of one function, scaled."""
 
-    Attributes
-    ----------
-    Z : (N, n)
-        Inputs, scaled to [−1, 1] over their ranges.
-    value : (N,)
-        Of the function.
-    weight : (N,)
-        How much each row counts.
-    slopes : (N, q), optional
-        Derivatives along q directions, scaled as the inputs.
-    directions : (n, q), optional
-        These directions.
-    reach : (N,), optional
-        Weight of a row's slopes beside its value: the scaled length over which a difference of slope makes a
-        difference of value that counts as much.
-    """
-
-    Z: np.ndarray
-    value: np.ndarray
-    weight: np.ndarray
-    slopes: np.ndarray | None = None
-    directions: np.ndarray | None = None
+    Z: np.ndarray  # (N, n) inputs, scaled to [−1, 1] over their ranges
+    value: np.ndarray  # (N,) of the function
+    weight: np.ndarray  # (N,) of each row in the fit
+    slopes: np.ndarray | None = None  # (N, q) derivatives along q directions, scaled as the inputs
+    directions: np.ndarray | None = None  # (n, q)
+    # (N,) weight of a row's slopes beside its value: the scaled length over which a difference of slope makes a
+    # difference of value that counts as much
     reach: np.ndarray | None = None
 
     def take(self, rows: np.ndarray) -> Samples:

@@ -25,7 +25,7 @@ from palpate.units import Range
 
 __all__ = ["LEAST_CONTRAST", "LumpPresses", "change_errors", "learn_lumps"]
 
-LEAST_CONTRAST = 0.01  # of the force: a change below it is felt by nobody, and is not judged
+LEAST_CONTRAST = 0.01  # of the force: a change below it is felt by nobody, and has no error
 FELT = 0.003  # ΔU/U at which a lookup counts half
 IMAGES = 4  # of each lookup by the body's symmetry, at most
 UNITS, FEWER_UNITS = 640, 120  # of ln(D/U), and of ln β
@@ -110,7 +110,7 @@ class LumpPresses:
         return np.unique(np.round(self.X[:, :2] / unit), axis=0, return_inverse=True)[1].ravel()
 
     @property
-    def judged(self) -> np.ndarray:
+    def contrast_rows(self) -> np.ndarray:
         """Rows of presses solved with a lump whose change of force counts."""
         size = np.linalg.norm(self.force, axis=1)
         with np.errstate(invalid="ignore"):
@@ -162,7 +162,7 @@ def learn_lumps(
 
 @dataclass(frozen=True, eq=False)
 class _Shape:
-    """What is chosen once, before presses are left out: scaling, distance exponent and widths."""
+    """The choices of a fit, made once before presses are left out: scaling, distance exponent and widths."""
 
     middle: np.ndarray
     half: np.ndarray
@@ -259,15 +259,15 @@ def _curvature(presses: LumpPresses) -> float:
 
 
 def _left_out_errors(presses: LumpPresses, shape: _Shape, k: float, units: int) -> np.ndarray:
-    """Return the contrast error (M,) of the judged presses, each learnt without the presses at its place."""
-    judged, groups = presses.judged, presses.groups
-    if len(judged) < FEWEST:
+    """Return the contrast error (M,) of presses in `contrast_rows`, each learnt without the presses at its place."""
+    contrast_rows, groups = presses.contrast_rows, presses.groups
+    if len(contrast_rows) < FEWEST:
         return np.empty(0)
     names = np.random.default_rng(0).permutation(np.unique(groups))
     errors = []
     for fold in range(FOLDS):
         out = np.isin(groups, names[fold::FOLDS])
-        asked = judged[out[judged]]
+        asked = contrast_rows[out[contrast_rows]]
         if not len(asked):
             continue
         contrast = shape.fit(presses.take(np.flatnonzero(~out)), k, units)

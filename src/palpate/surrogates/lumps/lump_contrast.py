@@ -39,7 +39,7 @@ __all__ = ["LumpContrast", "closed_form", "contrast_inputs"]
 
 @dataclass(frozen=True, eq=False)
 class LumpContrast:
-    """What any lump adds to a body's energy, as a value that its file keeps.
+    """The energy that any lump adds to a body's, as a value that its file keeps.
 
     Attributes
     ----------

@@ -215,15 +215,19 @@ class ExamPage(LocalServer):
         body_with_lumps(self._surrogate, self._body, lumps).save(path)
         self.loop.swap(path)
 
-    def _practise(self, _: ExamWish) -> None:
+    def _some_lumps(self) -> tuple[Lump, ...]:
+        """Return lumps at random, one at least; a body without room for any is refused."""
         drawn = (self._draw(secrets.randbits(31)) for _ in range(_DRAWS))
-        lumps = next(filter(None, drawn), ())  # practice without a lump teaches nothing
-        if not lumps:
-            raise UsageError(
-                "There is no room for a lump in this body.",
-                why="Under the area that can be pressed all lumps would leave it, for their size.",
-                fix="Take a thicker body, or one that was learnt over a larger area.",
-            )
+        if lumps := next(filter(None, drawn), ()):
+            return lumps
+        raise UsageError(
+            "There is no room for a lump in this body.",
+            why="Under the area that can be pressed all lumps would leave it, for their size.",
+            fix="Take a thicker body, or one that was learnt over a larger area.",
+        )
+
+    def _practise(self, _: ExamWish) -> None:
+        lumps = self._some_lumps()  # practice without a lump teaches nothing
         self._feel(lumps, self._practised)
         self._practice, self._score = Practice(self.kind, self._body, lumps), ""
 
@@ -237,6 +241,8 @@ class ExamPage(LocalServer):
 
     def _examine(self, _: ExamWish) -> None:
         seed, begun = self._seed, time.monotonic()
+        if self._lumps is None:
+            self._some_lumps()  # a body that can have none would be examined for nothing
         lumps = self._draw(seed) if self._lumps is None else self._lumps
         exam = Examination.begin(
             self.directory,

@@ -103,6 +103,8 @@ class ExamPage(LocalServer):
         self._lumps = None if lumps is None else tuple(lumps)
         for lump in self._lumps or ():
             require_inside(self._body, lump, self._surface.points)
+        if surrogate.lumps is not None:
+            surrogate.lumps.require(self._lumps or ())
         self._practice: Practice | None = None
         self._exam: Examination | None = None
         self._notice, self._score = "", ""
@@ -171,7 +173,7 @@ class ExamPage(LocalServer):
         heard = Bucket(MESSAGES, MESSAGES_AT_ONCE)
         self._pages.append(socket)
         try:
-            await socket.send_text((await run_in_threadpool(self._news)).to_json())
+            await socket.send_text((await run_in_threadpool(self._greet)).to_json())
             while (message := await socket.receive())["type"] != "websocket.disconnect":
                 wish = ExamWish.from_json(message.get("text") or "")
                 news = await run_in_threadpool(self._follow, wish)
@@ -184,6 +186,11 @@ class ExamPage(LocalServer):
             await socket.close(1003, error.what)
         finally:
             self._pages.remove(socket)
+
+    def _greet(self) -> ExamNews:
+        """Return the state for a page that has just come."""
+        with self._turn:
+            return self._news()
 
     def _follow(self, wish: ExamWish) -> ExamNews:
         """Carry out a wish, and return the state after it; a refusal is told in its notice."""

@@ -39,6 +39,7 @@ from palpate.study.solver_study import (
 )
 from palpate.study.stage_records import SECTIONS, RuntimeRecord
 from palpate.study.study import InteractionRecord
+from palpate.study.tool_kind import SHAPES, FileShape
 
 PAGE = Path(__file__).parent / "guide" / "study-file.md"
 BEGIN, END = "<!-- generated: begin -->", "<!-- generated: end -->"
@@ -68,6 +69,8 @@ def _tables() -> Iterator[str]:
         yield from _table(title, record, _purpose(record))
     for acting in get_args(InteractionRecord):
         yield from _kind_of("interaction", acting)
+    for shape in (*SHAPES.values(), FileShape):
+        yield from _kind_of("interaction.shape", shape)
     yield from _table("`[[interaction.loads]]`, once per load", LoadRecord, _purpose(LoadRecord))
     yield from _table("`[memory]`, of a body that yields or creeps", MemoryRecord, _purpose(MemoryRecord))
     yield from _table("`[[varied]]`, once per number", VariedRecord, _purpose(VariedRecord))

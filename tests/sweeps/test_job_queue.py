@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,14 +17,15 @@ from sweep_problems import Spring
 from palpate.dataset import Dataset
 from palpate.errors import ResourceError, UsageError
 from palpate.sweeps import JobQueue, sweep
+from palpate.sweeps.case import NoTimeLeft, failed_rows
 from palpate.sweeps.plan import make_plan
-from palpate.sweeps.runner import connect, run
+from palpate.sweeps.runner import Machines, connect, run
 from system_programs import require_program
 
 OPTIONS = {"cores": 1, "memory": "500MB", "walltime": "00:02:00"}
 QUEUE = """[slurm]
 jobs = {at_once}
-cores = 1
+cores = {cores}
 memory = "500MB"
 walltime = "{walltime}"
 scheduler_options = {{host = "127.0.0.1"}}
@@ -83,6 +85,15 @@ def test_a_queue_that_is_not_here_is_said(tmp_path, monkeypatch):
         sweep(Spring(), samples=4, cluster=JobQueue("slurm", 1, OPTIONS, tmp_path), progress=False)
 
 
+def test_a_queue_without_jobs_leaves_the_keys_of_another_sweep_alone(tmp_path):
+    key = tmp_path / "keys" / "key.pem"
+    key.parent.mkdir()
+    key.touch()
+    with JobQueue("slurm", 1, OPTIONS, tmp_path):
+        pass
+    assert key.exists()
+
+
 @pytest.fixture(scope="module")
 def slurm(tmp_path_factory):
     for name in PROGRAMS:
@@ -91,10 +102,12 @@ def slurm(tmp_path_factory):
         yield environment
 
 
-def start(folder: Path, slurm: dict[str, str], walltime="00:02:00", at_once=2, **content) -> subprocess.Popen:
+def start(
+    folder: Path, slurm: dict[str, str], walltime="00:02:00", at_once=2, cores=1, **content
+) -> subprocess.Popen:
     """Start the sweep as a process of its own."""
     queue = folder / "queue.toml"
-    queue.write_text(QUEUE.format(walltime=walltime, at_once=at_once), encoding="utf-8")
+    queue.write_text(QUEUE.format(walltime=walltime, at_once=at_once, cores=cores), encoding="utf-8")
     (folder / "log").mkdir(exist_ok=True)
     places = {"queue": queue, "jobs": folder / "jobs", "log": folder / "log", "path": folder / "a.zarr"}
     code = SWEEP.format(
@@ -162,11 +175,65 @@ def test_kills_lose_nothing_and_repeat_only_what_was_in_flight(tmp_path, slurm, 
 
 @pytest.mark.full
 def test_no_case_is_begun_in_a_job_that_ends_before_it(tmp_path, slurm):
-    """Jobs of 30 s, of which the last ten are too few for any case: none is ended in the midst of one."""
-    driver = start(tmp_path, slurm, "00:00:30", at_once=1, samples=50, seconds=0.4)
+    """Jobs of 30 s, of which the last ten are too few for any case: none is ended in the midst of one.
+
+    Of the two threads of a job each waits for the other's chain, before the job ends.
+    """
+    driver = start(tmp_path, slurm, "00:00:30", at_once=1, cores=2, samples=110, seconds=0.5)
     assert driver.communicate(timeout=250)[1] == ""
     assert set(solves(tmp_path).values()) == {1}
     assert len(list((tmp_path / "jobs").glob("*.out"))) > 1  # the first was followed by another
+
+
+class BusyClient:
+    """A client whose workers have no time left for the first chains that they get."""
+
+    status = "running"
+
+    def __init__(self, refusals: int, schema, *, fresh: bool) -> None:
+        self.refusals, self.schema, self.fresh = refusals, schema, fresh
+        self.ended = []
+
+    def nthreads(self):
+        return {f"worker {number}": 4 for number in range(10)}
+
+    def retire_workers(self, workers, *, close_workers):
+        assert close_workers
+        self.ended += workers
+
+    def submit(self, _, task, points, *, pure):
+        future = Future()
+        if self.refusals:
+            self.refusals -= 1
+            future.set_exception(NoTimeLeft(f"worker {self.refusals}", 10.0, self.fresh))
+        else:
+            future.set_result(failed_rows(len(points), self.schema, "none was asked for"))
+        future.status = "error" if future.exception() else "finished"
+        return future
+
+
+def test_the_end_of_many_jobs_at_once_says_nothing_of_a_chain():
+    plan = make_plan(Spring(), None, 8, 0, None, None)
+    client, answered = BusyClient(200, plan.schema, fresh=False), []
+    run(
+        Machines(client, lambda: None),
+        plan.problem,
+        plan.schema,
+        plan.points,
+        plan.chains(),
+        lambda rows, _: answered.extend(rows),
+        60.0,
+    )
+    assert sorted(answered) == list(range(8))
+    assert len(client.ended) == 200
+
+
+def test_a_chain_for_which_no_fresh_job_has_time_is_said():
+    plan = make_plan(Spring(), None, 8, 0, None, None)
+    client = BusyClient(200, plan.schema, fresh=True)
+    asked = (plan.problem, plan.schema, plan.points, plan.chains(), lambda *_: None, 60.0)
+    with pytest.raises(ResourceError, match="too short for this sweep"):
+        run(Machines(client, lambda: None), *asked)
 
 
 def test_a_chain_longer_than_a_job_is_said(cluster):

@@ -7,12 +7,13 @@ run in. What ends the child costs the case that did it: the others go on in a ne
 from __future__ import annotations
 
 import collections
+import contextlib
 import os
 import pickle
 import threading
 import time
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -95,19 +96,46 @@ class Failure:
 class NoTimeLeft(Exception):
     """A worker whose job ends before a chain would."""
 
-    def __init__(self, worker: str, expected: float) -> None:
-        super().__init__(worker, expected)
+    def __init__(self, worker: str, expected: float, fresh: bool) -> None:
+        super().__init__(worker, expected, fresh)
         self.worker = worker  # its address
         self.expected = expected  # s that it should have left
+        self.fresh = fresh  # whether it has not begun any chain before
+
+
+class _Chains:
+    """Chains of this process, one in each of its threads."""
+
+    changed = threading.Condition()
+    begun = running = 0
+
+
+@contextlib.contextmanager
+def _counted() -> Iterator[None]:
+    """Count a chain among those of this process."""
+    with _Chains.changed:
+        _Chains.begun += 1
+        _Chains.running += 1
+    try:
+        yield
+    finally:
+        with _Chains.changed:
+            _Chains.running -= 1
+            _Chains.changed.notify_all()
 
 
 def _require_time(task: Task) -> None:
-    """Refuse a chain that would outlast the job that this process belongs to, if it belongs to one."""
+    """Refuse a chain that would outlast the job that this process belongs to, if it belongs to one.
+
+    The job ends by that, and so it waits for the chains of other threads.
+    """
     end, expected = os.environ.get(JOB_END), max(task.expected, _LEAST_LEFT)
     if end is not None and time.time() + expected > float(end):
         from distributed import get_worker
 
-        raise NoTimeLeft(str(get_worker().address), expected)
+        with _Chains.changed:
+            _Chains.changed.wait_for(lambda: _Chains.running == 0)
+        raise NoTimeLeft(str(get_worker().address), expected, _Chains.begun == 0)
 
 
 class _Local(threading.local):
@@ -140,6 +168,11 @@ def solve_chain(task: Task, points: np.ndarray) -> Columns:
     longer than the limit not at all. After a case that failed for good the others go on with a new solver.
     """
     _require_time(task)
+    with _counted():
+        return _solve_rows(task, points)
+
+
+def _solve_rows(task: Task, points: np.ndarray) -> Columns:
     columns = empty(len(points), task.schema)
     child = prepare_child()
     failures: collections.Counter[int] = collections.Counter()

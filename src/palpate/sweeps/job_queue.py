@@ -1,8 +1,9 @@
 """Workers as jobs of a cluster's queue: SLURM and the others that dask-jobqueue speaks to.
 
-The scheduler runs beside the sweep, on the machine that asked for it; each job is one or more of Dask's own workers,
-which connect to it over TLS with a key that is new for each sweep. Jobs come and go: the queue starts them when it has
-room, ends them at their time limit or kills them, and Dask asks for others as long as something is left to solve.
+The scheduler runs beside the sweep, on the machine that asked for it; each job is one of Dask's own workers, with a
+thread for each core, and connects to it over TLS with a key that is new for each sweep. Jobs come and go: the queue
+starts them when it has room, ends them at their time limit or kills them, and Dask asks for others as long as
+something is left to solve. It does not see a job end that has several workers.
 """
 
 from __future__ import annotations
@@ -40,7 +41,16 @@ _KINDS = {
 _OURS = frozenset({"jobs", "python", "interface", "scheduler_options"})
 # what this module settles itself
 _SETTLED = frozenset(
-    {"scheduler", "name", "security", "protocol", "shared_temp_directory", "nanny", "config_name"}
+    {
+        "scheduler",
+        "name",
+        "security",
+        "protocol",
+        "shared_temp_directory",
+        "nanny",
+        "config_name",
+        "processes",
+    }
 )
 _EXAMPLE = '[slurm]\njobs = 10\ncores = 4\nmemory = "8GB"\nwalltime = "01:00:00"\nqueue = "normal"'
 _WAIT = "30s"  # after which a worker without a scheduler ends, and with it its job
@@ -116,19 +126,14 @@ class JobQueue:
         return cls(kind, table["jobs"], {k: v for k, v in table.items() if k != "jobs"}, Path(folder))
 
     def __str__(self) -> str:
-        each = count(self.processes, "process", "processes")
+        each = count(self.options["cores"], "core")
         limit = f", {duration(self.seconds)} each" if self.seconds else ""
         return f"{self.kind}: at most {count(self.jobs, 'job')} of {each}{limit}"
 
     @property
-    def processes(self) -> int:
-        """Worker processes of a job."""
-        return int(self.options.get("processes", self.options["cores"]))
-
-    @property
     def slots(self) -> int:
-        """Cases that all jobs solve at once."""
-        return self.jobs * self.processes
+        """Cases that all jobs solve at once: one on each core."""
+        return self.jobs * int(self.options["cores"])
 
     @property
     def seconds(self) -> float | None:
@@ -158,7 +163,7 @@ class JobQueue:
         if self._running is not None:
             self._running.close()
             self._running = None
-        shutil.rmtree(self._keys, ignore_errors=True)
+            shutil.rmtree(self._keys, ignore_errors=True)  # not where another sweep has them
 
     @property
     def _keys(self) -> Path:
@@ -180,7 +185,7 @@ class JobQueue:
         no_pages = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
         scheduler = {"allowed_failures": 0, **no_pages, **self.options.get("scheduler_options", {})}
         options = {
-            "processes": self.processes,
+            "processes": 1,
             "job_name": "palpate",
             "log_directory": str(self.folder),
             "death_timeout": _WAIT,

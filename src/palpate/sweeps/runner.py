@@ -159,7 +159,7 @@ def run(
     waiting = collections.deque(_Chain(rows) for rows in chains)
     pending: dict[Any, _Chain] = {}
     task, ahead = _task(problem, schema, case_limit), _Ahead(machines)
-    refused = 0  # chains for which workers had no time left, one after the other
+    refused = set[str]()  # workers that had no time left for their first chain, since the last answer
 
     def submit(chain: _Chain) -> None:
         own = replace(task, expected=_SLACK * slowest * chain.rows.size)
@@ -184,12 +184,13 @@ def run(
             chain = pending.pop(future)
             answers, error = _outcome(client, future)
             if answers is not None:
-                refused = 0
+                refused.clear()
                 slowest = max(slowest, longest(answers))
                 accept(chain.rows, answers)
             elif isinstance(error, NoTimeLeft):
-                refused += 1
-                if refused > machines.tries:
+                # at the end of many jobs at once all of their workers refuse: that says nothing of the chain
+                refused.update([error.worker] if error.fresh else ())
+                if len(refused) > machines.tries:
                     raise _too_short(error.expected, machines.job_seconds, chain.rows.size)
                 client.retire_workers([error.worker], close_workers=True)
                 waiting.appendleft(chain)

@@ -60,6 +60,15 @@ class TestMesh:
         assert again == scan
         assert np.array_equal(again.rest().points, scan.rest().points)
 
+    @pytest.mark.parametrize("name", ["balls.mhd", "balls.nhdr"])
+    def test_voxels_in_a_file_beside_the_header_are_of_the_content(self, tmp_path, name):
+        first = ImportedScan(ball_in_ball(tmp_path / name), NAMES).digest
+        (voxels,) = (file for file in tmp_path.iterdir() if file.name != name)
+        content = bytearray(voxels.read_bytes())
+        content[-1] ^= 1
+        voxels.write_bytes(content)
+        assert ImportedScan(str(tmp_path / name), NAMES).digest != first
+
 
 class TestPlaces:
     @pytest.mark.parametrize(

@@ -56,6 +56,8 @@ WITHIN = 60.0  # degrees from a direction within which a surface faces that way
 _NAMED = {
     ".xdmf": re.compile(rb">\s*([^<>:\s][^<>:\r\n]*\.(?:h5|hdf5?|hdf)):", re.I),
     ".inp": re.compile(rb"^\*\s*include\s*,\s*input\s*=\s*([^\r\n,]+)", re.I | re.M),
+    ".mhd": re.compile(rb"^\s*ElementDataFile\s*=\s*([^\r\n]+)", re.I | re.M),
+    ".nhdr": re.compile(rb"^data ?file:\s*([^\r\n]+)", re.I | re.M),
 }
 TETGEN = (".node", ".ele", ".face")  # ends of the files of one mesh
 Point = tuple[float, float, float]
@@ -73,7 +75,7 @@ def require_unit(unit: Any) -> None:
 
 
 def named_files(path: str) -> tuple[Path, ...]:
-    """Files that are read together with a file: TetGen's others, those of an XDMF file's numbers, included ones."""
+    """Files that are read together with a file: TetGen's others, an XDMF file's or scan's numbers, included ones."""
     file = Path(path)
     ending = part_ending(path)
     if ending in TETGEN:

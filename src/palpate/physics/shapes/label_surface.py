@@ -80,8 +80,10 @@ class _Lattice:
 
     def __init__(self, image: LabelImage, spacing: float) -> None:
         self.image, self.spacing = image, spacing
-        used = np.argwhere(image.labels > 0)
-        low, high = used.min(axis=0), used.max(axis=0) + 1
+        used = image.labels > 0
+        ends = [np.flatnonzero(used.any(axis=across))[[0, -1]] for across in ((1, 2), (0, 2), (0, 1))]
+        low, last = np.transpose(ends)
+        high = last + 1
         # two more points around the body, in all directions, where nothing is
         counts = np.ceil((high - low) * image.spacing / spacing).astype(int) + 6
         middle = ((low + high) / 2 - 0.5) * image.spacing  # m along the axes from the first voxel's centre

@@ -217,10 +217,8 @@ class ExamPage(LocalServer):
     def _draw(self, seed: int) -> tuple[Lump, ...]:
         return hide_lumps(self.kind, self._body, self._surface, seed, self._surrogate.lumps)
 
-    def _feel(self, lumps: Sequence[Lump], path: Path) -> None:
-        """Put the body with lumps into the hand, from a file that is written first."""
-        body_with_lumps(self._surrogate, self._body, lumps).save(path)
-        self.loop.swap(path)
+    def _lumped(self, lumps: Sequence[Lump]) -> Surrogate:
+        return body_with_lumps(self._surrogate, self._body, lumps)
 
     def _some_lumps(self) -> tuple[Lump, ...]:
         """Return lumps at random, one at least; a body without room for any is refused."""
@@ -235,7 +233,8 @@ class ExamPage(LocalServer):
 
     def _practise(self, _: ExamWish) -> None:
         lumps = self._some_lumps()  # practice without a lump teaches nothing
-        self._feel(lumps, self._practised)
+        self._lumped(lumps).save(self._practised)
+        self.loop.swap(self._practised)
         self._practice, self._score = Practice(self.kind, self._body, lumps), ""
 
     def _show(self, _: ExamWish) -> None:
@@ -251,6 +250,9 @@ class ExamPage(LocalServer):
         if self._lumps is None:
             self._some_lumps()  # a body that can have none would be examined for nothing
         lumps = self._draw(seed) if self._lumps is None else self._lumps
+        felt = self._lumped(lumps)
+        if self._surrogate.lumps is not None:
+            time.sleep(max(0.0, begun + _SETTLE - time.monotonic()))
         exam = Examination.begin(
             self.directory,
             self.kind,
@@ -263,9 +265,7 @@ class ExamPage(LocalServer):
         )
         self._seed += 1
         try:
-            self._feel(lumps, exam.felt)
-            if self._surrogate.lumps is not None:
-                time.sleep(max(0.0, begun + _SETTLE - time.monotonic()))
+            felt.save(exam.felt)
             self._take(exam)
         except BaseException:
             exam.close()
@@ -284,9 +284,7 @@ class ExamPage(LocalServer):
         exam = Examination.resume(past.folder, self._clocks)
         try:
             if not exam.felt.is_file():  # it was killed before the body with its lumps was written
-                self._feel(exam.past.lumps, exam.felt)
-            else:
-                self.loop.swap(exam.felt)
+                self._lumped(exam.past.lumps).save(exam.felt)
             self._take(exam)
         except BaseException:
             exam.close()
@@ -294,7 +292,8 @@ class ExamPage(LocalServer):
         self._notice = "It goes on where it was interrupted."
 
     def _take(self, exam: Examination) -> None:
-        """Record the touch of an examination from now on."""
+        """Put the body of an examination into the hand, and record its touch from now on."""
+        self.loop.swap(exam.felt)
         self.loop.start_recording(exam.past.next_trace)
         self._exam, self._score = exam, ""
 

@@ -190,7 +190,7 @@ def _mesh_scan(
 ) -> tuple[BodyMesh, tuple[str, ...]]:
     """Return the mesh of a labelmap and notes about it: a function for the child process in which Netgen runs."""
     image = clear_specks(name_labels(path, read_scan(path), labels))
-    size = image.labels.shape * image.spacing
+    size = np.array(image.labels.shape) * image.spacing
     require_size(path, float(size.max()), "mm")
     turned = turn_upwards(image, up)
     volume = sum(image.volumes.values())

@@ -8,7 +8,6 @@ from palpate.dataset import Dataset
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
 from palpate.options import FitOptions
-from palpate.surrogates.learnt_torque import turn_inputs
 from palpate.units import Quantity, Range
 
 __all__ = ["ARM_OUTPUTS", "learn_arm"]
@@ -27,12 +26,12 @@ def learn_arm(
     matrices: np.ndarray | None = None,
     about: np.ndarray | None = None,
 ) -> Fitted | None:
-    """Return the arm learnt from converged solves; None where they tell no torque, are too few, or turn the tool.
+    """Return the arm learnt from converged solves; None where they tell no torque or are too few.
 
     `inputs` are those of the energy beside which it is learnt, `matrices` (k, 3, 3) the symmetry of body and tool, the
     identity among it, and `about` (3,) the point that stays, m. An arm turns with the body; a mirror turns it round.
     """
-    if "torque" not in data or turn_inputs(inputs):
+    if "torque" not in data:
         return None
     force, torque = data.response[:, :3], data["torque"]
     size = np.linalg.norm(force, axis=1)

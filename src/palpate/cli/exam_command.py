@@ -35,7 +35,7 @@ def exam(
         list[str] | None,
         typer.Option(
             help="Lump in place of drawn ones: x, y, z and radius (m, or with units) and ratio of moduli, with "
-            "semicolons between: '5 mm; 0; -8 mm; 6 mm; 10'. Several times."
+            "semicolons between: '5 mm; 0 mm; 22 mm; 6 mm; 10' in the breast. Several times."
         ),
     ] = None,
     folder: Annotated[
@@ -186,7 +186,7 @@ def _lump(text: str) -> Lump:
         raise UsageError(
             f"--lump {text!r} is no lump.",
             why="A lump has five numbers with semicolons between: x, y, z, radius, ratio.",
-            fix="--lump '5 mm; 0 mm; -8 mm; 6 mm; 10'",
+            fix="--lump '5 mm; 0 mm; 22 mm; 6 mm; 10'",
         )
     names = ("x", "y", "z", "radius")
     x, y, z, radius = (

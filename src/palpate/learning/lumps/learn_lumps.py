@@ -241,7 +241,8 @@ def _rows(presses: LumpPresses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(0)
     order = np.argsort(rng.random((N * L, len(group))), axis=1)[:, :count]  # other images for each lookup
     M = group[order.ravel()]
-    index = np.repeat(np.stack(np.divmod(np.arange(N * L), L), axis=1), count, axis=0)
+    inside = np.repeat(presses.density.ravel() > 0, count)  # a small lump may meet no quadrature point
+    M, index = M[inside], np.repeat(np.stack(np.divmod(np.arange(N * L), L), axis=1), count, axis=0)[inside]
     X = about + np.einsum("nij,nj->ni", M, presses.X[index[:, 0]] - about)
     P = about + np.einsum("nij,nj->ni", M, presses.place[index[:, 0], index[:, 1]] - about)
     return contrast_inputs(X, P, presses.radius[index[:, 0], index[:, 1]]), M, index

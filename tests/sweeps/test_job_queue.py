@@ -236,6 +236,19 @@ def test_a_chain_for_which_no_fresh_job_has_time_is_said():
         run(Machines(client, lambda: None), *asked)
 
 
+@pytest.mark.full
+def test_jobs_that_end_before_they_solve_are_said(tmp_path, slurm, monkeypatch):
+    for name in ("SLURM_CONF", "PATH"):
+        monkeypatch.setenv(name, slurm[name])
+    monkeypatch.setattr("palpate.sweeps.job_queue._LOOK", 2.0)
+    options = {**OPTIONS, "job_script_prologue": ["exit 1"], "scheduler_options": {"host": "127.0.0.1"}}
+    with (
+        JobQueue("slurm", 2, options, tmp_path) as queue,
+        pytest.raises(ResourceError, match="ended before any of them could solve"),
+    ):
+        sweep(Spring(), samples=8, cluster=queue, progress=False)
+
+
 def test_a_chain_longer_than_a_job_is_said(cluster):
     plan = make_plan(Spring(seconds=0.05), None, 8, 0, None, None)
     asked = (plan.problem, plan.schema, plan.points, plan.chains(), lambda *_: None, 60.0)

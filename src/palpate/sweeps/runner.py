@@ -70,15 +70,18 @@ def connect(cluster: Any, workers: int | None) -> Iterator[Machines]:
     import distributed
 
     known: dict[str, Any] = {}
+    revive: Callable[[], None] = _nothing
     with contextlib.ExitStack() as stack:
         if cluster is None:
             cluster = stack.enter_context(local_cluster(workers))
         elif isinstance(cluster, JobQueue):
             known = {"tries": _JOB_TRIES, "slots": cluster.slots, "job_seconds": cluster.seconds or math.inf}
+            revive = cluster.replace_lost
             cluster = cluster.start()
         elif isinstance(cluster, OnDemandCluster):
             cluster = cluster.start()
-        revive = cluster.revive if isinstance(cluster, LocalCluster) else _nothing
+        if isinstance(cluster, LocalCluster):
+            revive = cluster.revive
         if isinstance(cluster, distributed.Client):
             yield Machines(cluster, revive, **known)
         else:

@@ -15,9 +15,12 @@ from pathlib import Path
 
 import palpate as pp
 from palpate.physics.materials.tissues import TISSUES
+from palpate.surrogates import Surrogate, TouchedSurface
 from palpate.surrogates.shipped_bodies import FOLDER, SHIPPED
 
 PRESSES, UNSEEN = 40, 16
+MODES, TABLE = 16, 400_000  # of the drawn shape; numbers in a table of distances that is large
+FLOOR = 1e-6  # m: what is above it is no base
 DEPTHS = 2  # of each place: what a lump adds changes faster along the surface than with depth
 
 
@@ -77,11 +80,28 @@ def make(name: str, folder: Path, presses: int = PRESSES, unseen: int = UNSEEN) 
         verdict = pp.validate(body, test)
         print(verdict, flush=True)
         body = replace(body, meta={**body.meta, "validation": verdict.summary()})
-    body = replace(body, meta={**body.meta, "words": SHIPPED[name]})
+    body = small(replace(body, meta={**body.meta, "words": SHIPPED[name]}), train)
     FOLDER.mkdir(exist_ok=True)
     path = body.signed("The palpate developers", "MIT").save(FOLDER / f"{name}.palpate")
     print(f"{path}: {os.path.getsize(path) / 1e3:.0f} kB", flush=True)
     return path
+
+
+def small(body: Surrogate, data: pp.Dataset) -> Surrogate:
+    """Return the body with a coarser table of distances and fewer modes of its shape, so that its file stays small."""
+    shown = body.surface_fields["displacement"]
+    few = replace(shown, network=shown.network.select(range(MODES)), modes=shown.modes[:MODES])
+    body = replace(body, fields={"displacement": few})
+    energy = body.hand_energy
+    touched, radius = energy.baseline.surface, energy.baseline.radius
+    if touched is None or touched.coefficients.size < TABLE:
+        return body
+    above = data.rest[data.triangles][:, :, 2].mean(axis=1) > FLOOR
+    numbers = {name: getattr(touched, name) for name in ("radius", "reach", "inner")}
+    coarse = TouchedSurface.of(
+        data.rest, data.triangles[above], **numbers, spacing=radius / 4, shoulder=radius / 3
+    )
+    return body.with_energy(replace(energy, baseline=energy.baseline.with_surface(coarse)))
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ __all__ = [
     "Count",
     "Densities",
     "Metres",
+    "NewtonMetres",
     "Newtons",
     "Number",
     "PadStiffness",
@@ -83,6 +84,7 @@ Radians = Annotated[float, Unit("rad")]
 SquareMetres = Annotated[float, Unit("m^2")]
 QuarticMetres = Annotated[float, Unit("m^4")]
 Newtons = Annotated[float, Unit("N")]
+NewtonMetres = Annotated[float, Unit("N*m")]
 Pascals = Annotated[float, Unit("Pa")]
 Densities = Annotated[float, Unit("kg/m^3")]
 Stiffness = Annotated[float, Unit("N/m")]

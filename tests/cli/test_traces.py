@@ -59,8 +59,11 @@ def test_a_run_says_what_it_recorded_and_the_trace_knows_it(palpate, file, trace
     words = palpate("trace", "info", trace).out
     assert "MB a minute" in words
     assert "to the last bit" in words
-    answer = palpate("run", file, "--seconds", "0.3", "--record", tmp_path / "b.trace")
+    limits = ("--max-force", "2", "--max-torque", "50 mN m")
+    answer = palpate("run", file, "--seconds", "0.3", *limits, "--record", tmp_path / "b.trace")
     assert "recorded" in answer.out
+    known = read_trace(tmp_path / "b.trace").header["limits"]
+    assert (known["max_force"], known["max_torque"]) == (2.0, 0.05)
     assert palpate("run", file, "--record", trace).code == UsageError.exit_code, "no recording is replaced"
 
 

@@ -12,7 +12,7 @@ from examined import plane, slab
 import pressed
 from palpate.errors import UsageError
 from palpate.experiments.exam_kinds import hide_lumps, kind_of_body
-from palpate.experiments.exam_lumps import place_of, require_inside, schematic_lumps
+from palpate.experiments.exam_lumps import body_with_lumps, place_of, require_inside, schematic_lumps
 from palpate.experiments.exam_touch import ExamSurface
 from palpate.surrogates import Lump
 
@@ -44,6 +44,13 @@ def test_what_a_schematic_lump_adds_is_the_formula_above_it_and_nothing_far_away
     expected = 5 * math.sqrt(0.010 * depth) * volume / (math.pi**2 * h**4) * x / (1 + 0.4 * x)
     assert ratio[0] - 1.0 == pytest.approx(expected, rel=1e-9)
     assert abs(ratio[1] - 1.0) < 1e-3 * expected
+
+
+def test_the_deviation_of_the_force_does_not_tell_whether_there_are_lumps():
+    energy = pressed.surrogate().hand_energy
+    body = pressed.surrogate().with_energy(replace(energy, root=np.eye(4 + energy.network.units)))
+    for lumps in ([], [LUMP]):
+        assert body_with_lumps(body, slab(), lumps).hand_energy.root is None
 
 
 def test_the_signal_is_half_as_strong_beside_a_lump_where_boussinesq_has_it():

@@ -23,6 +23,7 @@ from palpate.experiments.exam_folders import past_examinations
 from palpate.experiments.exam_kinds import kind_of_body
 from palpate.experiments.exam_page import ExamPage
 from palpate.experiments.exam_score import score_examination
+from palpate.experiments.examination import Examination
 from palpate.processes import helper_environment
 from palpate.runtime.replay import Replay
 from palpate.runtime.touchable import load_touchable
@@ -69,6 +70,16 @@ def greeting(page: ExamPage) -> str:
 def exam_page(folder: Path, **options) -> ExamPage:
     options = {"device": "stroke:frequency=4", "lumps": [LUMP], "port": 0} | options
     return ExamPage(kind_of_body("slab", slab()), pressed.surrogate(), directory=folder, **options)
+
+
+def test_an_examination_of_another_body_of_the_same_name_does_not_go_on(tmp_path):
+    page = exam_page(tmp_path / "exams")
+    page._rest = pressed.surrogate().save(tmp_path / "rest.palpate")
+    other = pressed.surrogate().signed("Another", "MIT").save(tmp_path / "other.palpate")
+    with Examination.begin(tmp_path / "exams", page.kind, other, [LUMP]) as exam:
+        name = exam.folder.name
+    with pytest.raises(UsageError, match="begun on another body"):
+        page._resume(ExamWish("resume", name=name))
 
 
 def felt_depth(page: ExamPage) -> float:

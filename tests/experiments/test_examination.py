@@ -72,7 +72,9 @@ def test_nothing_is_ever_replaced(tmp_path, body):
     assert len(past_examinations(tmp_path / "exams")) == 3
     assert len(list((tmp_path / "exams" / "bodies").iterdir())) == 1  # of one body, once
     (exams[0].folder / "touch-1.trace").touch()
-    assert exams[0].next_trace().name == "touch-2.trace"
+    assert exams[0].past.next_trace.name == "touch-2.trace"
+    (exams[0].folder / "touch-3.trace").touch()  # the second was taken away
+    assert exams[0].past.next_trace.name == "touch-4.trace"
 
 
 def test_two_processes_cant_hold_one_examination(tmp_path, body):

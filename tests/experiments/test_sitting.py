@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from palpate.cli.experiment_commands import write_plan as write_the_plan
 from palpate.errors import FileFormatError, StudyError, UsageError
 from palpate.experiments import analyse, read_plan
 from palpate.experiments.ready_plans import KINDS, ready_plan
@@ -45,6 +47,40 @@ def test_a_ready_plan_is_a_plan_and_a_sitting_goes_on_from_its_answers(kind, tmp
     rest = answered(second)
     assert len(rows) + len(rest) == second.total
     assert second.next() is None
+
+
+def test_a_sitting_does_not_go_on_from_answers_to_other_trials(folder):
+    files = run_through(folder, "01", count=6)
+    rows = files.rows()
+    Sitting(folder.plan, "sub-01").restore(rows)
+    rows[5]["level"] = str(float(rows[5]["level"]) + 0.05)
+    with pytest.raises(UsageError, match="can't go on"):
+        Sitting(folder.plan, "sub-01").restore(rows)
+    with pytest.raises(UsageError, match="of its table is of another trial"):
+        Sitting(folder.plan, "sub-02").restore(rows)
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path):
+    file = write_plan(tmp_path)
+    (tmp_path / "trial").mkdir()
+    (tmp_path / "trial" / "dataset_description.json").write_text("{}")
+    (tmp_path / "trial" / "participants.tsv").write_text("participant_id\tage\nsub-01\t30\n")
+    with pytest.raises(UsageError, match=r"participants\.tsv, and nothing is ever overwritten"):
+        StudyFolder.beside(file).prepare(file)
+    assert (tmp_path / "trial" / "dataset_description.json").read_text() == "{}"
+
+
+def test_a_plan_names_bodies_from_where_it_lies(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    bodies = [tmp_path / "whole.palpate", Path("models") / "other.palpate"]
+    (tmp_path / "plans").mkdir()
+    file = Path("plans") / "trial.toml"
+    write_the_plan(bodies, "discrimination", "trial", file, show=False)
+    plan = read_plan(file)
+    for named, body in zip((plan.reference, plan.comparison[0].file), bodies, strict=True):
+        assert (file.parent / named).resolve() == body.resolve()
+    with pytest.raises(UsageError, match="letters and digits"):
+        write_the_plan(bodies, "discrimination", "my trial", None, show=False)
 
 
 def test_people_differ_and_runs_differ(tmp_path):
@@ -130,6 +166,8 @@ def test_a_line_that_a_kill_cut_off_is_left_out(folder):
     whole = files.table.read_bytes()
     with files.table.open("ab") as table:
         table.write(b"3.2\t1.0\t1\t8\ttri")
+    analyse(folder)  # it does not change the file
+    assert files.table.read_bytes() != whole
     assert len(files.rows()) == 7
     assert files.table.read_bytes() == whole
 
@@ -145,12 +183,17 @@ def test_nothing_is_overwritten(folder, tmp_path):
     changed = write_plan(tmp_path, change=("trials = 80", "trials = 60"))
     with pytest.raises(UsageError, match="has changed since the first sitting"):
         folder.prepare(changed)
+    run_through(folder, "x1", count=1)
+    with pytest.raises(UsageError, match="case"):
+        folder.sitting(Participant("X1"), 1)
 
 
 def test_two_programs_do_not_run_one_sitting(folder):
     files = run_through(folder, "01", count=3)
     with files.held(), pytest.raises(UsageError, match="another process"), files.held():
         pass
+    with files.held(), pytest.raises(UsageError, match="being run"):
+        folder.forget(Participant("sub-01"))
     with files.held():
         pass
 

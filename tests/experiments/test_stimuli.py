@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models import spring_beam
-from palpate.errors import DeviceError, UsageError
+from palpate.errors import DeviceError, ResourceError, UsageError
 from palpate.experiments import stiffened
 from palpate.experiments.conductor import Conductor
 from palpate.experiments.experiment_plan import Plan
@@ -230,3 +230,32 @@ def test_a_hidden_lump_is_felt_and_one_that_leaves_the_skin_is_refused(stage):
     large = plan.model_copy(update={"vary": plan.vary.model_copy(update={"high": 0.03})})
     with pytest.raises(UsageError, match="leaves the skin"):
         Stimuli(large, stage.tmp, stage.tmp / "lumps")
+    x, y, z = place
+    moved = plan.model_copy(update={"vary": plan.vary.model_copy(update={"place": (x + 1e-3, y, z)})})
+    again = Stimuli(moved, stage.tmp, stage.tmp / "lumps").felt(trial, trial.target)
+    assert again.file != stimuli.felt(trial, trial.target).file  # the lump where the plan now has it
+
+
+def test_a_full_disk_ends_in_words_and_the_trial_comes_again(stage, monkeypatch):
+    c = stage.c
+    c.hear({"agree": True})
+    c.hear({"go": True})
+    stage.lead("question")
+    trial = c.sitting.next()
+
+    def refuse(*_):
+        raise ResourceError("The disk is full.")
+
+    monkeypatch.setattr(stage.files, "append", refuse)
+    monkeypatch.setattr(stage.files, "note", refuse)
+    c.hear({"answer": 1})
+    assert c.phase == "failed"
+    assert "The disk is full." in c.control_view()["said"]
+    assert c.sitting.next() == trial
+
+
+def test_a_hand_that_is_no_number_is_not_heard(stage):
+    for hand in (float("nan"), "deep", None, [0.5]):
+        stage.c.hear({"hand": hand, "held": True})
+    assert stage.c._hand == 0.0
+    assert not stage.c._held

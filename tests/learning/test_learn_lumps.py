@@ -7,7 +7,7 @@ import pytest
 
 from palpate.errors import UsageError
 from palpate.learning.lumps import LumpPresses, learn_lumps
-from palpate.learning.lumps.learn_lumps import change_errors
+from palpate.learning.lumps.learn_lumps import _curvature, change_errors
 from palpate.surrogates.lumps import LumpRoom
 from palpate.surrogates.lumps.lump_contrast import closed_form
 from palpate.units import Range
@@ -72,6 +72,12 @@ def test_its_own_error_is_about_that_of_unseen_lumps(learnt):
 
 def test_the_constant_of_the_closed_form_is_found(learnt):
     assert learnt.curvature == pytest.approx(K, rel=1e-9)
+
+
+def test_a_change_of_the_wrong_sign_is_no_word_of_the_closed_form():
+    presses = _presses(14, 40, seed=0)
+    presses.added[3] *= -1e-3  # as of a lump far away, whose change is less than the solves' own error
+    assert _curvature(presses) == pytest.approx(K, rel=1e-9)
 
 
 def test_presses_at_few_places_are_refused():

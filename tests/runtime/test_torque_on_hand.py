@@ -11,7 +11,7 @@ import tooled
 from palpate.devices import Sample
 from palpate.devices.device import Traits
 from palpate.devices.trace_file import read_trace
-from palpate.errors import DeviceLostError
+from palpate.errors import DeviceLostError, UsageError
 from palpate.runtime import Fault
 from palpate.runtime.hand_turn import LEVER, rotation_of
 from palpate.runtime.loop import Loop
@@ -34,7 +34,7 @@ class Wrist:
         self.traits = Traits(
             0.05, 10.0, 0.5, "a test", axes=AXES, orients=orients, max_torque=torque, resolution=1e-6
         )
-        self.sample, self.fails = Sample(), None
+        self.sample, self.fails, self.breaks = Sample(), None, None
         self.sample.holding = True
         self.forces, self.torques = [], []
 
@@ -48,6 +48,8 @@ class Wrist:
     def write(self, force, *torque):
         """Keep force and torque; a device without motors in its wrist is given none."""
         assert len(torque) == (self.traits.max_torque > 0.0)
+        if self.breaks is not None:
+            raise self.breaks
         self.forces.append(force.copy())
         self.torques.append(torque[0].copy() if torque else np.zeros(3))
 
@@ -64,12 +66,12 @@ class Wrist:
 class Bench:
     """A loop around a wrist and a body; `press` and `turn` lead the hand evenly."""
 
-    def __init__(self, body, shared, device=None, *, stiffness=0.0, recorder=None):
+    def __init__(self, body, shared, device=None, *, stiffness=0.0, recorder=None, limit=math.inf):
         self.body, self.device, self.now = touchable(body), device or Wrist(), 0.0
         traits = self.device.traits
         self.loop = Loop(
-            self.body, self.device, shared, self.body.workspace(traits.radius), Limits(traits.max_force),
-            stiffness=stiffness, recorder=recorder,
+            self.body, self.device, shared, self.body.workspace(traits.radius),
+            Limits(traits.max_force, max_torque=limit), stiffness=stiffness, recorder=recorder,
         )  # fmt: skip
         self.w, self.at = np.zeros(3), 0.01 * UP
         self.device.sample.position[:] = self.at
@@ -136,6 +138,15 @@ def test_the_torque_is_the_tools_in_the_devices_axes(body, shared):
     np.testing.assert_allclose(bench.torques[-1], [-y, x, z], rtol=1e-6, atol=1e-9)
 
 
+def test_a_limit_of_torque_below_the_devices_own_holds(body, shared):
+    bench = Bench(body, shared, limit=0.2 * MOST)
+    bench.press()
+    bench.run(200)
+    assert np.linalg.norm(bench.torques, axis=1).max() == pytest.approx(0.2 * MOST)
+    with pytest.raises(UsageError, match="torque limit of -1 N m"):
+        Limits(1.0, max_torque=-1.0)
+
+
 def test_a_device_without_motors_in_its_wrist_is_given_forces_alone(body, shared):
     bench = Bench(body, shared, Wrist(torque=0.0))
     bench.press()
@@ -166,6 +177,41 @@ def test_what_ends_the_force_ends_the_torque_at_once(body, shared, how):
     assert faults[-1] is wanted
     assert faults[:-1] == [Fault.NONE] * (patience - 1)
     assert (bench.torques[-1] == 0.0).all()
+
+
+def test_a_torque_that_was_not_delivered_is_not_claimed(body, shared):
+    bench = Bench(body, shared)
+    bench.press()
+    assert bench.loop.out.torque.any()
+    bench.device.breaks = DeviceLostError("gone")
+    assert bench.tick() is Fault.DEVICE_LOST
+    assert not bench.loop.out.torque.any()
+    assert not bench.loop.out.force.any()
+
+
+def test_the_end_of_the_loop_writes_and_publishes_no_force_and_no_torque(body, shared):
+    bench = Bench(body, shared)
+    bench.press()
+    bench.loop.end()
+    assert not bench.loop.device_error
+    assert not bench.device.forces[-1].any()
+    assert not bench.torques[-1].any()
+    assert not bench.loop.out.torque.any()
+
+
+@pytest.mark.parametrize("torque", [0.0, MOST])
+def test_a_torque_that_is_no_number_is_a_fault_and_not_published(body, shared, torque):
+    bench = Bench(body, shared, Wrist(torque=torque))
+    bench.press()
+    answer = bench.loop.evaluator
+
+    def nonsense(position, parameters, force):
+        answer.torque[:] = math.nan
+
+    answer._torque_at = nonsense
+    assert bench.tick() is Fault.OUTPUT_NOT_FINITE
+    np.testing.assert_array_equal(bench.loop.out.torque, np.zeros(3))
+    np.testing.assert_array_equal(bench.torques[-1], np.zeros(3))
 
 
 def test_one_bad_orientation_is_passed_over(body, shared):
@@ -230,6 +276,19 @@ def test_a_tool_turns_with_the_hand_from_where_it_was(shared, turns):
     np.testing.assert_allclose(bench.parameters(), in_body[:turns], atol=1e-9)
     bench.run(400, w=np.array([0.0, 0.8, 0.0]))
     assert bench.parameters()[0] == tooled.TILT  # the border of what was trained
+
+
+def test_a_handle_that_is_rolled_on_and_on_keeps_its_tool_at_the_border(shared):
+    """Beyond half a turn a rotation vector leaps to the other side; the tool does not, and comes back with the hand."""
+    bench = Bench(tooled.turned_surrogate(3), shared)
+    for angle in np.linspace(0.0, 1.8 * math.pi, 600):
+        bench.device.turn(angle * UP)
+        assert bench.tick() is Fault.NONE
+        assert bench.parameters()[2] == pytest.approx(min(angle, tooled.TILT), abs=1e-9)
+    for angle in np.linspace(1.8 * math.pi, -0.1, 600):
+        bench.device.turn(angle * UP)
+        assert bench.tick() is Fault.NONE
+    assert bench.parameters()[2] == -tooled.TILT
 
 
 def test_a_turned_tool_gives_nothing_back_on_closed_ways_of_place_and_turn(shared):

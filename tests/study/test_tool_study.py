@@ -185,14 +185,29 @@ def test_a_tool_of_a_file_lies_beside_its_study(tmp_path: Path):
     assert read_study(again) == study
 
 
-def test_the_page_of_a_part_shows_a_tool_from_a_file_without_sizes(part: Path, tmp_path: Path):
-    trimesh.creation.icosphere(subdivisions=2, radius=8.0).export(tmp_path / "tip.stl")
-    study = part_study(part, tool="capsule")[0]
+def under(study: Study, **changes: object) -> Study:
+    """A study of a part with other keys of its tool."""
     content = study.model_dump()
-    content["interaction"]["shape"] = {"kind": "file", "file": str(tmp_path / "tip.stl"), "unit": "mm"}
-    facts = shown_part(Study.model_validate(content)).facts()
-    (own,) = (tool for tool in facts.tools if tool.name == facts.choices["tool"])
-    assert [size.name for size in own.sizes] == ["turn_x", "turn_y", "turn_z"]
+    content["interaction"] |= changes
+    return Study.model_validate(content)
+
+
+def test_the_page_shows_a_part_under_a_tool_from_a_file(part: Path):
+    ball = part.with_name("ball.stl")
+    trimesh.creation.icosphere(subdivisions=2, radius=8.0).export(ball)
+    study = under(
+        part_study(part, tool="capsule")[0], shape={"kind": "file", "file": str(ball), "unit": "mm"}
+    )
+    facts = shown_part(study).facts()
+    assert facts.choices["tool"] == "file"
+    assert "file" in [tool.name for tool in facts.tools]
+
+
+def test_what_turns_of_a_tool_stays_when_its_sizes_are_chosen(part: Path):
+    study = under(part_study(part, tool="capsule")[0], turns="axis", tilt=0.2)
+    wish = wish_for(shown_part(study), "capsule", radius="5 mm", length="20 mm")
+    tool = chosen_study(study, choices_of(wish, None, None)).interaction.build_tool()
+    assert tool == PosedTool(Capsule(0.005, 0.020), turns="axis", tilt=0.2)
 
 
 def test_a_tool_whose_file_is_missing_is_refused(tmp_path: Path):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.network import Network, Scaling
 from palpate.surrogates.lumps import LumpContrast, LumpRoom
+from palpate.surrogates.lumps.gaussian_sum import GaussianSum
 from palpate.surrogates.lumps.lump_room import skin_of
-from palpate.units import Quantity, Range, bounds
+from palpate.units import Range, bounds
 from surrogates.touch_made import BOX
 
 ROOM = LumpRoom(
@@ -28,18 +28,16 @@ def contrast(seed: int = 0) -> LumpContrast:
     inputs = (*BOX, *offsets, Range("ln r", float(np.log(0.004)), float(np.log(0.008))))
     low, high = bounds(inputs)
     rng = np.random.default_rng(seed)
-    scaling = Scaling((low + high) / 2, (high - low) / 2, np.zeros(1), np.ones(1))
 
-    def network(constant: float, name: str) -> Network:
-        return Network.axis_aligned(
-            inputs,
-            (Quantity(name),),
+    def part(constant: float) -> GaussianSum:
+        return GaussianSum(
+            (low + high) / 2,
+            (high - low) / 2,
             centres=rng.uniform(-1, 1, (20, 7)),
-            widths=np.broadcast_to(rng.uniform(1.5, 2.5, 7), (20, 7)),
-            weights=rng.normal(0, 0.1, (1, 20)),
-            tail=np.array([[constant, *rng.uniform(-0.05, 0.05, 7)]]),
-            scaling=scaling,
+            widths=rng.uniform(1.5, 2.5, 7),
+            weights=rng.normal(0, 0.1, 20),
+            tail=np.array([constant, *rng.uniform(-0.05, 0.05, 7)]),
         )
 
     # (r/|o|)³ |o|⁻¹ of a lump of 6 mm at 25 mm, and of that a few per cent
-    return LumpContrast(network(-4.2, "ln(D/U)"), network(-1.2, "ln beta"), 4.0, 0.14, ROOM)
+    return LumpContrast(part(-4.2), part(-1.2), 4.0, 0.14, ROOM)

@@ -46,8 +46,15 @@ def test_a_ball_is_no_tool():
         ("punch, radius 6 kg", "unit of something else"),
         ("punch, radius 6", "no unit"),
         ("punch, radius 2 mm, edge 4 mm", "edge radius of a punch is 4 mm"),
+        ("ball, radius 6 mm", "--radius"),
     ],
 )
 def test_what_is_no_tool_is_refused_in_words(text: str, words: str):
     with pytest.raises(UsageError, match=f"(?is){words}"):
         read_tool(text, 0.010)
+
+
+@pytest.mark.parametrize("sizes", [{}, {"radius": 0.005}, {"radius": 0.005, "edge": 0.001, "width": 0.01}])
+def test_sizes_of_another_tool_are_refused_with_those_that_it_has(sizes):
+    with pytest.raises(UsageError, match="sizes of a punch are radius, edge"):
+        tool_by_name("punch", sizes)

@@ -18,7 +18,7 @@ _TURNED = math.radians(2.0)  # by which a tool of fixed orientation may be turne
 
 
 class SceneTool:
-    """What touches the body in the scene: a geom at its centre, or a site at its foremost point, in its own axes."""
+    """A tool of the scene that touches a body: a geom by its centre, or a site at its foremost point, in own axes."""
 
     def __init__(self, number: int, name: str, model: Any, body: Surrogate, posed: Any) -> None:
         self.number, self.name, self.is_site = number, name, posed is not None

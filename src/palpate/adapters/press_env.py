@@ -154,12 +154,12 @@ class PressEnv(_gymnasium.Env):  # type: ignore[misc]
         return np.concatenate(parts).astype(np.float32)
 
     def _info(self) -> dict[str, Any]:
-        """Return force and wanted force, N, depth, m, whether it is trained, and a torque, N m, that is told."""
-        told: dict[str, Any] = {}
+        """Return force and wanted force, N, depth, m, whether it is trained, and the torque, N m, where it is known."""
+        torque: dict[str, Any] = {}
         if self._torque is not None:
             self._torque(self._place, self._parameters, self._evaluator.force)
-            told["torque"] = self._torque.torque.copy()
-        return told | {
+            torque["torque"] = self._torque.torque.copy()
+        return torque | {
             "force": self._evaluator.force.copy(),
             "wanted": self.wanted,
             "depth": self._evaluator.depth,

@@ -22,7 +22,7 @@ from palpate.cli.sweep_command import sweep
 from palpate.cli.table_commands import correct, fit
 from palpate.cli.table_options import Force, Json, Verbose, with_table_options
 from palpate.cli.touch_command import touch
-from palpate.cli.touch_options import DeadMan, Device, Friction, NoController, Unsoftened
+from palpate.cli.touch_options import DeadMan, Device, Friction, MaxForce, MaxTorque, NoController, Unsoftened
 from palpate.cli.trace_commands import replay, trace_app
 from palpate.cli.umbridge_command import serve_umbridge
 from palpate.errors import UsageError
@@ -233,6 +233,8 @@ def view(
     no_controller: NoController = False,
     dead_man: DeadMan = False,
     friction: Friction = None,
+    max_force: MaxForce = None,
+    max_torque: MaxTorque = None,
 ) -> None:
     """Open a page on which you can touch the model, or set its inputs by sliders. Only this machine can reach it."""
     if _shows_answers(model, port=port, browser=browser, strict_port=strict_port, token=token):
@@ -248,6 +250,8 @@ def view(
         controller=not no_controller,
         dead_man=dead_man,
         friction=friction,
+        max_force=max_force,
+        max_torque=max_torque,
     )
 
 
@@ -317,6 +321,8 @@ def run(
     no_controller: NoController = False,
     dead_man: DeadMan = False,
     friction: Friction = None,
+    max_force: MaxForce = None,
+    max_torque: MaxTorque = None,
     record: Annotated[
         Path | None, typer.Option(help="New file that takes every tick; see [bold]palpate replay[/].")
     ] = None,
@@ -336,6 +342,8 @@ def run(
         dead_man=dead_man,
         record=record,
         friction=friction,
+        max_force=max_force,
+        max_torque=max_torque,
     )
 
 
@@ -443,6 +451,8 @@ def _serve(
     controller: bool = True,
     dead_man: bool = False,
     friction: float | None = None,
+    max_force: float | None = None,
+    max_torque: float | None = None,
 ) -> None:
     from palpate.runtime.touchable import aim_device, load_touchable
     from palpate.runtime.warm_up import WarmUp
@@ -458,7 +468,8 @@ def _serve(
         model,
         port=settings.get("port", 8080) if port is None else port,
         rate=settings.get("rate", 1000.0),
-        max_force=settings.get("max_force"),
+        max_force=max_force or settings.get("max_force"),
+        max_torque=max_torque or settings.get("max_torque"),
         open_browser=browser and sys.stdout.isatty(),
         strict_port=strict_port,
         token=token,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 import webbrowser
 from pathlib import Path
@@ -52,11 +53,12 @@ def write_plan(
     from palpate.experiments.ready_plans import ready_plan
     from palpate.files import write_file
 
-    text = ready_plan(kind, name, bodies or ([Path("body.palpate"), Path("other.palpate")]))
+    file = out or Path(f"{name}.toml")
+    files = [_seen_from(file.parent, body) for body in bodies or ()]
+    text = ready_plan(kind, name, files or ["body.palpate", "other.palpate"])
     if show:
         typer.echo(text)
         return
-    file = out or Path(f"{name}.toml")
     if file.exists():
         raise UsageError(
             f"{file} is there already.",
@@ -65,6 +67,16 @@ def write_plan(
         )
     write_file(file, text)
     Console().result(f"{file}: edit it, then `palpate experiment simulate {file}`.", {})
+
+
+def _seen_from(folder: Path, body: Path) -> str:
+    """Return the path of a body as a plan in a folder names it."""
+    if body.is_absolute():
+        return str(body)
+    try:
+        return Path(os.path.relpath(body, folder)).as_posix()
+    except ValueError:  # on another drive of Windows
+        return str(body.absolute())
 
 
 @experiment_app.command()
@@ -168,7 +180,9 @@ def analyse_folder(plan: PlanFile, as_json: Json = False) -> None:
     from palpate.experiments.analysis import analyse
     from palpate.experiments.study_folder import StudyFolder
 
-    analysis = analyse(StudyFolder.beside(plan))
+    folder = StudyFolder.beside(plan)
+    folder.require_plan(plan)
+    analysis = analyse(folder)
     Console(as_json).result(str(analysis), analysis.as_dict())
 
 

@@ -94,6 +94,8 @@ def run_loop(
     dead_man: bool = False,
     record: Path | None = None,
     friction: float | None = None,
+    max_force: float | None = None,
+    max_torque: float | None = None,
 ) -> None:
     """Run a model's loop for a while, in s, and print its report.
 
@@ -101,7 +103,7 @@ def run_loop(
     `unsoftened` lets a body that is too stiff for the device feel so all the same, `controller` lets the passivity
     controller damp, and with `dead_man` the force acts only while the device's first button is held. `record` is a new
     file that takes every tick; if it stops by itself the loop runs on, and a `ResourceError` follows the report. A
-    coefficient of `friction` of the tool takes the place of the file's.
+    coefficient of `friction` of the tool, and limits of force (N) and torque (N m), take the place of the file's.
     """
     touch = load_touchable(model, friction)
     device_traits(device)  # a name that is none is refused before anything is compiled
@@ -109,7 +111,6 @@ def run_loop(
     rate = rate or settings.get("rate", 1000.0)
     if warning := correction_warning(touch.meta):
         console.say(f"its correction was warned of: {warning}")
-    limit = settings.get("max_force")
     peak = _Peak()
     began = time.monotonic()
     warm_up = WarmUp("loop", body=touch)
@@ -122,7 +123,8 @@ def run_loop(
             model,
             device=device,
             rate=rate,
-            max_force=limit,
+            max_force=max_force or settings.get("max_force"),
+            max_torque=max_torque or settings.get("max_torque"),
             unsoftened=unsoftened,
             controller=controller,
             dead_man=dead_man,

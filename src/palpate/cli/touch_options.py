@@ -8,7 +8,7 @@ import typer
 
 from palpate.cli.number_options import number_option
 
-__all__ = ["DeadMan", "Device", "Friction", "NoController", "Unsoftened"]
+__all__ = ["DeadMan", "Device", "Friction", "MaxForce", "MaxTorque", "NoController", "Unsoftened"]
 
 Device = Annotated[
     str,
@@ -20,6 +20,19 @@ Friction = Annotated[
         "--friction",
         least=0.0,
         help="Coefficient of friction of the tool on the body, such as 0.3. Default: that of the model.",
+    ),
+]
+MaxForce = Annotated[
+    float | None,
+    number_option("--max-force", "N", above=0, help="Largest force (N). Default: that of the study."),
+]
+MaxTorque = Annotated[
+    float | None,
+    number_option(
+        "--max-torque",
+        "N*m",
+        above=0,
+        help="Largest torque (N m) on a device that renders one. Default: that of the study.",
     ),
 ]
 Unsoftened = Annotated[

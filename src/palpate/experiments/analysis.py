@@ -24,32 +24,46 @@ _BAD_FIT = 0.025
 
 @dataclass(frozen=True)
 class PersonResult:
-    """What one person's answers of one condition say: intervals are lower end, median, upper end."""
+    """The results of one person in one condition: intervals are lower end, median, upper end."""
 
     participant: str
     condition: str
-    trials: int
-    location: tuple[float, float, float]
-    spread: tuple[float, float, float]
-    lapse: float
+    trials: int  # counted answers
+    location: tuple[float, float, float]  # point of equality or threshold μ, in the unit of the levels
+    spread: tuple[float, float, float]  # JND of discrimination, else σ, in the unit of the levels
+    lapse: float  # median of λ
     deviance: float
-    p: float
-    notes: tuple[str, ...]
+    p: float  # share of repetitions from the fitted function whose deviance is larger
+    notes: tuple[str, ...]  # a sentence on each thing that makes the estimate doubtful
 
 
 @dataclass(frozen=True)
 class GroupResult:
-    """What the people of one condition say together."""
+    """The results of the people of one condition together."""
 
     condition: str
-    location: GroupMean
-    log_spread: GroupMean
-    same: Equivalence | None
+    location: GroupMean  # of μ
+    log_spread: GroupMean  # of ln JND or ln σ
+    same: Equivalence | None  # test that the body is felt as the reference is
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """The results of an experiment: people, groups, and ratings where those were asked."""
+    """The results of an experiment: people, groups, and ratings where those were asked.
+
+    Attributes
+    ----------
+    plan : Plan
+        The experiment's plan.
+    people : tuple of PersonResult
+        Results of each person in each condition.
+    groups : tuple of GroupResult
+        Results of each condition with two people or more.
+    ratings : dict
+        By condition and statement: median, quartiles, people, and p against the reference.
+    left_out : tuple of str
+        A sentence on each sitting or person that does not count.
+    """
 
     plan: Plan
     people: tuple[PersonResult, ...]

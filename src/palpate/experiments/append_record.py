@@ -21,7 +21,7 @@ from typing import Any, BinaryIO, Self
 from palpate.errors import FileFormatError, UsageError
 from palpate.files import system_errors
 
-__all__ = ["AppendRecord", "Clocks", "read_events"]
+__all__ = ["AppendRecord", "Clocks", "hold_file", "read_events"]
 
 JUMP = (
     2.0  # s by which wall and steady clock may disagree between two events: more is a jump of the wall clock
@@ -49,7 +49,7 @@ class AppendRecord:
         self.path, self._clocks = Path(path), clocks or Clocks()
         with system_errors(f"The record {self.path} could not be opened."):
             self._file: BinaryIO = self.path.open("ab", buffering=0)
-        if not _lock(self._file):
+        if not hold_file(self._file):
             self._file.close()
             raise UsageError(
                 f"{self.path.parent.name} is in use.",
@@ -140,8 +140,8 @@ def read_events(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
     return events
 
 
-def _lock(file: BinaryIO) -> bool:
-    """Lock an open file until it is closed; return False where another process has locked it."""
+def hold_file(file: BinaryIO) -> bool:
+    """Lock an open file until it is closed or its process ends; return False where another one has locked it."""
     try:
         if sys.platform == "win32":
             import msvcrt

@@ -8,9 +8,11 @@ is the device, whose drawn force is then the stimulus.
 
 from __future__ import annotations
 
+import contextlib
+import math
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,7 +40,7 @@ _BEYOND = 1.5  # of the guided depth: how far the page's hand reaches
 
 @dataclass
 class _Touch:
-    """What happened in one interval."""
+    """A touch of one interval."""
 
     presses: int = 0
     force: float = 0.0
@@ -58,6 +60,7 @@ class _Attempt:
     wall: float
     interval: int = 1
     touches: list[_Touch] = field(default_factory=list)
+    felt: list[Felt] = field(default_factory=list)  # the body of each interval
     asked: float = 0.0
 
 
@@ -103,11 +106,12 @@ class Conductor:
 
     def hear(self, message: Mapping[str, Any]) -> None:
         """Take a message of the participant's page: the hand, consent, going on, an answer."""
-        with self._lock:
+        with self._lock, self._failing():
             self._heard = self._clock()
             self._hidden = bool(message.get("hidden", False))
-            if "hand" in message:
-                self._hand = float(np.clip(float(message["hand"]), 0.0, 1.0))
+            hand = message.get("hand")
+            if isinstance(hand, int | float) and math.isfinite(hand):
+                self._hand = float(np.clip(hand, 0.0, 1.0))
                 self._held = bool(message.get("held", False))
             if message.get("agree") is True and self.phase == "consent":
                 self.files.note("The participant agreed to the consent text.", self.sitting.done + 1)
@@ -119,7 +123,7 @@ class Conductor:
 
     def command(self, message: Mapping[str, Any]) -> None:
         """Take a message of the control page: pause, resume, end, a note."""
-        with self._lock:
+        with self._lock, self._failing():
             wish = message.get("wish")
             if wish == "pause" and self.phase not in {"paused", "done", "failed", "consent"}:
                 self._drop("The experimenter paused.")
@@ -194,16 +198,21 @@ class Conductor:
         with self._lock:
             if self.phase in {"done", "failed"}:
                 return
-            try:
+            with self._failing():
                 self._look()
                 self._go_on()
-            except PalpateError as error:
+
+    @contextlib.contextmanager
+    def _failing(self) -> Iterator[None]:
+        """End the sitting in words where a device or the disk fails."""
+        try:
+            yield
+        except PalpateError as error:
+            self.phase, self.said = "failed", f"{error} Run the same command again: the sitting goes on here."
+            self.words = "There is an interruption. Please wait for the experimenter."
+            with contextlib.suppress(PalpateError):  # a full disk takes no note either
                 self._drop(str(error))
-                self.phase, self.said = (
-                    "failed",
-                    f"{error} Run the same command again: the sitting goes on here.",
-                )
-                self.words = "There is an interruption. Please wait for the experimenter."
+            self._attempt = None
 
     def _look(self) -> None:
         """Steer the page's hand, and take in force and depth."""
@@ -262,13 +271,19 @@ class Conductor:
         assert attempt is not None
         if self._depth > _TOUCHED:
             return
-        felt = self.stimuli.felt(attempt.trial, attempt.interval)
-        if self._felt is None or felt.file != self._felt.file:
-            self._lock.release()  # pages are shown and heard while the loop takes the next body
-            try:
+        self._lock.release()  # pages are shown and heard while bodies are made, and the loop takes the next one
+        try:
+            if (
+                not attempt.felt
+            ):  # all before the first interval: the time that it takes to make one would tell which it is
+                attempt.felt = [
+                    self.stimuli.felt(attempt.trial, k) for k in range(1, self.plan.intervals + 1)
+                ]
+            felt = attempt.felt[attempt.interval - 1]
+            if self._felt is None or felt.file != self._felt.file:
                 self.loop.swap(felt.file)
-            finally:
-                self._lock.acquire()
+        finally:
+            self._lock.acquire()
         self._felt = felt
         if felt.parameters:
             self.loop.shared.write_command(parameters=felt.parameters)

@@ -55,6 +55,17 @@ class Course:
 
     `catch` is the number of obvious trials among them, at the easiest level; they tell whether a person attends, move
     no placement and enter no fit. Each level comes as often with the comparison first as second, within one.
+
+    Attributes
+    ----------
+    placement : Placement
+        The rule by which levels follow one another.
+    function : Psychometric
+        The form that is fitted to the answers.
+    trials : int
+        Number of the counted trials.
+    catch : int
+        Number of the catch trials beside them; none by default.
     """
 
     placement: Placement
@@ -69,7 +80,7 @@ class Course:
 
     @property
     def mirrors(self) -> bool:
-        """Whether the placement thinks in strengths, to which a sign is drawn: a staircase of signed differences."""
+        """True where a placement's levels are strengths, whose sign is drawn: a staircase of signed differences."""
         return isinstance(self.placement, Staircase) and self.function.form == "signed"
 
     @property

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import secrets
 import shutil
 import sys
@@ -53,6 +54,7 @@ def make_folder(directory: Path, name: str, now: float) -> Path:
 
     A clock that was set back can't make it meet an earlier one: the name ends at random.
     """
+    name = re.sub(r"[^\w-]+", "-", name).strip("-") or "body"  # it stands in addresses too
     stem = f"{name}-{datetime.fromtimestamp(now):%Y%m%d-%H%M%S}-{secrets.token_hex(3)}"
     folder = directory / stem
     with system_errors(f"The folder {folder} of the examination could not be made."):
@@ -127,7 +129,12 @@ class PastExamination:
     @property
     def traces(self) -> tuple[Path, ...]:
         """The recorded touches, in the order of time."""
-        return tuple(sorted(self.folder.glob("touch-*.trace"), key=lambda path: int(path.stem[6:])))
+        return tuple(sorted(self.folder.glob("touch-*.trace"), key=_number))
+
+    @property
+    def next_trace(self) -> Path:
+        """A new file for the touch from now on, after all that are there."""
+        return self.folder / f"touch-{max((_number(path) for path in self.traces), default=0) + 1}.trace"
 
     @property
     def jumps(self) -> tuple[float, ...]:
@@ -139,6 +146,12 @@ class PastExamination:
         """The examination in a line."""
         said = [event["words"] for event in self.events if event["kind"] == "scored"]
         return said[-1] if said else ("not scored" if self.ended else "interrupted")
+
+
+def _number(trace: Path) -> int:
+    """Return the number of a recorded touch."""
+    digits = trace.stem.removeprefix("touch-")
+    return int(digits) if digits.isdecimal() else 0
 
 
 def past_examinations(directory: Path, only: Sequence[str] = ()) -> list[PastExamination]:

@@ -87,11 +87,13 @@ def _above_skin(body: Touchable, place: Sequence[float]) -> tuple[float, np.ndar
 def body_with_lumps(surrogate: Surrogate, body: Touchable, lumps: Sequence[Lump]) -> Surrogate:
     """Return a body with hidden lumps: learnt ones where it knows any, schematic ones elsewhere.
 
-    `body` is the surrogate as a hand finds it.
+    `body` is the surrogate as a hand finds it. With schematic lumps the posterior is left out, also where there are
+    none: else the deviation of the force on the page would tell whether there are.
     """
     if surrogate.lumps is not None:
         return surrogate.with_lumps(lumps)
-    return schematic_lumps(surrogate, body, lumps)
+    lumped = schematic_lumps(surrogate, body, lumps)
+    return lumped.with_energy(replace(lumped.hand_energy, root=None))
 
 
 def require_inside(body: Touchable, lump: Lump, points: np.ndarray) -> LumpPlace:

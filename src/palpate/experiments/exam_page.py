@@ -29,7 +29,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from palpate.devices import hand_kind
 from palpate.errors import PalpateError, UsageError
 from palpate.experiments.append_record import Clocks
-from palpate.experiments.exam_folders import exam_directory, past_examinations
+from palpate.experiments.exam_folders import exam_directory, keep_body, past_examinations
 from palpate.experiments.exam_kinds import ExamKind, hide_lumps
 from palpate.experiments.exam_lumps import body_with_lumps, require_inside, skin_under
 from palpate.experiments.exam_practice import Practice
@@ -256,6 +256,12 @@ class ExamPage(LocalServer):
         names = {past.name: past for past in past_examinations(self.directory, [self.kind.name])}
         if (past := names.get(wish.name)) is None:
             raise UsageError("There is no such examination.", fix="Choose one of the list.")
+        if past.facts["body"] != keep_body(self.directory, self._rest).name:
+            raise UsageError(
+                f"{past.name} was begun on another body.",
+                why="A body of this name was in another file, or was learnt anew.",
+                fix="Open the model file with which it was begun, or begin a new examination.",
+            )
         exam = Examination.resume(past.folder, self._clocks)
         try:
             if not exam.felt.is_file():  # it was killed before the body with its lumps was written
@@ -270,7 +276,7 @@ class ExamPage(LocalServer):
 
     def _take(self, exam: Examination) -> None:
         """Record the touch of an examination from now on."""
-        self.loop.start_recording(exam.next_trace())
+        self.loop.start_recording(exam.past.next_trace)
         self._exam, self._score = exam, ""
 
     def _mark(self, marked: Examination | Practice, wish: ExamWish) -> None:
@@ -285,9 +291,9 @@ class ExamPage(LocalServer):
         if (exam := self._exam) is None:
             return
         exam.end()
-        self.loop.stop_recording()
-        self._exam, self._score = None, exam.folder.name
+        self._exam, self._score = None, exam.folder.name  # nothing is marked any more, whatever fails below
         try:
+            self.loop.stop_recording()
             self._notice = score_examination(exam.past, self._body).words
             exam.record.add("scored", words=self._notice)
         finally:

@@ -48,12 +48,12 @@ class LumpResult:
 
     @property
     def depth(self) -> str:
-        """Whether it lies deep or shallow."""
+        """Class of its depth, deep or shallow."""
         return "deep" if self.at.cover >= self.depth_limit else "shallow"
 
     @property
     def hardness(self) -> str:
-        """Whether it is hard or soft."""
+        """Class of its hardness, hard or soft."""
         return "hard" if self.lump.ratio >= HARD else "soft"
 
     def is_near(self, mark: Mark, radius: float) -> bool:
@@ -92,7 +92,7 @@ def share_interval(hits: int, count: int) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class ExamScore:
-    """What was found and missed in an examination, and how it was searched for."""
+    """The score of an examination: lumps that were found and missed, and the way of searching."""
 
     past: PastExamination
     results: tuple[LumpResult, ...]

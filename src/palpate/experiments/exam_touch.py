@@ -1,4 +1,4 @@
-"""What was pressed in an examination: presses, how deep each place of the surface was pressed, and the order of search.
+"""The touch of an examination: presses, how deep each place of the surface was pressed, and the order of search.
 
 All of it follows from the recorded ticks. A ball of radius R at the depth s reaches s − a²/2R deep at the distance a
 beside the contact point; the largest of these over the examination is how deep a place was pressed.

@@ -93,10 +93,6 @@ class Examination:
         """The file of the body with its lumps, which the hand feels."""
         return self.folder / FELT
 
-    def next_trace(self) -> Path:
-        """Return a new file for the touch from now on."""
-        return self.folder / f"touch-{len(self.past.traces) + 1}.trace"
-
     def mark(self, place: Sequence[float]) -> Mark:
         """Mark a place (3,) on the skin, m."""
         if len(place) != 3 or not all(math.isfinite(v) for v in place):

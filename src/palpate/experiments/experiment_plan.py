@@ -49,7 +49,7 @@ class Comparison(Record):
 
 
 class Varied(Record):
-    """What is varied between the intervals of a trial.
+    """The quantity that varies between the intervals of a trial.
 
     `what` is "force", by whose factor the learnt body is made stiffer or softer, the name of an input of it, or "lump":
     a lump of that radius is hidden in the body. Of discrimination, `low` and `high` are ratios to the reference; of
@@ -74,7 +74,7 @@ class Varied(Record):
 
 
 class Placed(Record):
-    """How levels are chosen."""
+    """The rule by which levels are chosen."""
 
     kind: Literal["adaptive", "constant", "staircase"] = "adaptive"
     trials: Count = Field(default=80, ge=2, le=2000)  # counted ones, of each condition
@@ -84,7 +84,7 @@ class Placed(Record):
 
 
 class SittingRules(Record):
-    """How a sitting goes."""
+    """The rules of a sitting: practice, catch trials, breaks and times."""
 
     practice: Count = Field(default=4, ge=0, le=100)  # trials with feedback before the first
     catch: Count = Field(default=4, ge=0, le=200)  # obvious trials, of each condition
@@ -107,7 +107,7 @@ class DeviceRules(Record):
 
 
 class Wanted(Record):
-    """What the experiment shall show."""
+    """The aim of the experiment: equivalence within a margin, with a power, by so many people."""
 
     people: Count = Field(default=12, ge=2, le=1000)
     margin: Number = Field(default=0.5, gt=0.0)  # of equivalence, in JNDs
@@ -136,7 +136,39 @@ class Rating(Record):
 
 
 class Plan(Record):
-    """A plan of an experiment with people, as its file says it."""
+    """A plan of an experiment with people, as its file says it.
+
+    Attributes
+    ----------
+    name : str
+        Name of the experiment, letters and digits.
+    question : str
+        ``"discrimination"``, ``"odd-one-out"``, ``"detection"`` or ``"rating"``.
+    seed : int
+        From which all that chance decides follows, with the participant's label.
+    consent : str
+        Text to which a person agrees before the first trial, of at least 40 characters.
+    ask : str
+        Question after each trial; "" for the usual words.
+    reference : str
+        File of the learnt body with which others are compared.
+    comparison : tuple of Comparison
+        The bodies that are compared with it, at least one.
+    vary : Varied
+        The quantity that varies, and its levels.
+    placement : Placed
+        The rule by which levels are chosen, and the number of trials.
+    sitting : SittingRules
+        Practice, catch trials, breaks and times.
+    device : DeviceRules
+        The device, and the limits that protect a person.
+    wanted : Wanted
+        The aim: equivalence within a margin, with a power.
+    expect : Expected
+        The people who are expected, for simulation.
+    rating : tuple of Rating
+        Statements that are rated; none by default.
+    """
 
     name: str = Field(pattern=_LABEL)
     question: Question = "discrimination"

@@ -38,7 +38,17 @@ _LARGEST = 1e6  # τ² over the largest variance: beyond all that data show
 
 @dataclass(frozen=True)
 class GroupMean:
-    """The mean over people, the ends of its 95 % interval, and how much people differ (standard deviation τ)."""
+    """The mean over people, its 95 % interval, and how much people differ; all in the unit of the estimates.
+
+    Attributes
+    ----------
+    mean, low, high : float
+        The random-effects mean, and the lower and upper end of its interval.
+    between : float
+        Standard deviation τ of the people about the mean.
+    people : int
+        Number of people.
+    """
 
     mean: float
     low: float
@@ -49,9 +59,21 @@ class GroupMean:
 
 @dataclass(frozen=True)
 class Equivalence:
-    """The two one-sided tests: p is the larger of the two p-values, `margin` is in JNDs."""
+    """The two one-sided tests of equivalence.
 
-    shift: float  # mean of μ/JND over people
+    Attributes
+    ----------
+    shift : float
+        Mean of μ/JND over people.
+    margin : float
+        Largest shift that counts as equivalent, in JNDs.
+    p : float
+        The larger of the two p-values.
+    people : int
+        Number of people.
+    """
+
+    shift: float
     margin: float
     p: float
     people: int
@@ -63,7 +85,17 @@ class Equivalence:
 
 @dataclass(frozen=True)
 class Population:
-    """A population of observers: one in the middle, and standard deviations of μ and of ln σ about it."""
+    """A population of observers: one in the middle, and standard deviations of μ and of ln σ about it.
+
+    Attributes
+    ----------
+    middle : Observer
+        The person in the middle.
+    location_spread : float
+        Standard deviation of μ over people, in the unit of the levels.
+    log_spread : float
+        Standard deviation of ln σ over people.
+    """
 
     middle: Observer
     location_spread: float = 0.05
@@ -76,7 +108,13 @@ class Population:
 
 
 def group_mean(estimate: np.ndarray, deviation: np.ndarray) -> GroupMean:
-    """Return the random-effects mean of estimates (N,) with standard deviations (N,), of two people or more."""
+    """Return the random-effects mean of estimates (N,) with standard deviations (N,), of two people or more.
+
+    Raises
+    ------
+    UsageError
+        If there are fewer than two people, or a deviation is not above zero.
+    """
     y = checks.shape("The estimates", estimate, (None,))
     v = checks.shape("Their deviations", deviation, (len(y),)) ** 2
     if len(y) < 2 or not (v > 0).all():
@@ -104,7 +142,13 @@ def group_mean(estimate: np.ndarray, deviation: np.ndarray) -> GroupMean:
 
 
 def equivalence(location: np.ndarray, jnd: np.ndarray, margin: float) -> Equivalence:
-    """Return the two one-sided tests of points of equality (N,) and JNDs (N,) of people, for a margin in JNDs."""
+    """Return the two one-sided tests of points of equality (N,) and JNDs (N,) of people, for a margin in JNDs.
+
+    Raises
+    ------
+    UsageError
+        If there are fewer than two people, or the margin is not above zero.
+    """
     checks.positive("The margin of equivalence", margin)
     mu, own = checks.shape("The points of equality", location, (None,)), np.asarray(jnd, float)
     if len(mu) < 2:
@@ -137,7 +181,26 @@ def power_curve(
 ) -> np.ndarray:
     """Return the share of groups of each size (S,) that show equivalence: its power, by simulated people.
 
-    So many people are simulated once, and groups are drawn from them.
+    People are simulated once, and groups are drawn from them.
+
+    Parameters
+    ----------
+    course : Course
+        Trials of one condition, through which each person goes.
+    population : Population
+        The people from whom the simulated ones are drawn.
+    sizes : (S,) array of int
+        Numbers of people in a group.
+    margin : float
+        Largest shift that counts as equivalent, in JNDs; half of one by default.
+    level : float
+        Level of the test, 0.05 by default.
+    people : int
+        Number of simulated people.
+    groups : int
+        Number of groups of each size.
+    seed : int
+        Seed of people, answers and groups.
     """
     rng = np.random.default_rng(seed)
     location, spread = population.draw(people, rng)

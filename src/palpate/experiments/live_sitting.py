@@ -36,34 +36,12 @@ def run_sitting(
 ) -> Conductor:
     """Run a participant's sitting until it ends; one that was interrupted goes on where it was.
 
-    Parameters
-    ----------
-    plan_file : path
-        The plan; its experiment's folder lies beside it.
-    participant : Participant
-        Who sits there.
-    run : int
-        Number of the sitting of that participant, from 1.
-    device : str, optional
-        Another device than the plan's, such as ``haply:ws://localhost:10001``.
-    port : int
-        Port of the participant's page; the control page takes the next free one.
-    token : bool
-        Whether the pages ask for a token.
-    say : callable
-        Takes lines of progress.
-    on_ready : callable, optional
-        Called once with the participant's and the control page.
+    The experiment's folder lies beside the plan. `run` counts the participant's sittings from 1; `device` is another
+    one than the plan's, such as ``haply:ws://localhost:10001``. The participant's page has the `port`, and the control
+    page the next free one; with `token` both ask for a token. `say` takes lines of progress, and `on_ready` both pages.
 
-    Returns
-    -------
-    Conductor
-        As it stands at the end.
-
-    Raises
-    ------
-    UsageError
-        If the plan has changed, this sitting is finished, or it is being run elsewhere.
+    The conductor comes back as it stands at the end. A changed plan, a sitting that is finished and one that runs
+    elsewhere are UsageErrors.
     DeviceError
         If the device is missing.
     """

@@ -21,7 +21,7 @@ _LOW, _HIGH = 0.93, 0.97  # coverage of a 95 % interval that is fair
 
 @dataclass(frozen=True)
 class Outlook:
-    """What a plan can show: one person, simulated many times, the same with fatigue and learning, and the power."""
+    """The outlook of a plan: one person, simulated many times, the same with fatigue and learning, and the power."""
 
     plan: Plan
     person: Simulated
@@ -30,7 +30,7 @@ class Outlook:
 
     @property
     def reaches(self) -> bool:
-        """Whether the plan's people reach the power that is wanted; plans without that test do."""
+        """True where the plan's people reach the power that is wanted; plans without that test do."""
         return not self.power or self.power[self.plan.wanted.people] >= self.plan.wanted.power
 
     @property

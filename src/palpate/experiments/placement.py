@@ -48,7 +48,15 @@ class Placement(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Constant:
-    """Every level equally often: blocks in each of which every level comes once, in random order."""
+    """A placement of every level equally often: blocks in each of which every level comes once, in random order.
+
+    Attributes
+    ----------
+    levels : (L,) array
+        Levels, rising.
+    trials : int
+        Number of trials.
+    """
 
     levels: np.ndarray
     trials: int
@@ -74,6 +82,15 @@ class Staircase:
     """A staircase over levels that are strengths, rising from the hardest to the easiest.
 
     `down` right answers in a row lead `step_down` levels down, a mistake `step_up` up. It begins at the easiest.
+
+    Attributes
+    ----------
+    levels : (L,) array
+        Levels, rising.
+    down : int
+        Right answers in a row before it goes down, from 1.
+    step_up, step_down : int
+        Numbers of levels of a step, from 1.
     """
 
     levels: np.ndarray

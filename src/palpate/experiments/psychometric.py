@@ -92,10 +92,22 @@ class Answers:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What the answers of N people say of them; intervals have a lower end, a median and an upper end, (N, 3).
+    """Estimates from the answers of N people; intervals have a lower end, a median and an upper end, (N, 3).
 
-    `location` is μ; `spread` is the JND of the signed form and σ of the other, in the unit of the levels; `best` (N, 5)
-    is the most likely μ, σ, λ, γ and b on the grid.
+    Attributes
+    ----------
+    location : (N, 3)
+        μ, in the unit of the levels.
+    spread : (N, 3)
+        JND of the signed form and σ of the other, in the unit of the levels.
+    lapse : (N, 3)
+        Lapse rate λ, from 0 to 1.
+    side : (N, 3)
+        Preference b for the second interval, in the unit of the levels.
+    best : (N, 5)
+        The most likely μ, σ, λ, γ and b on the grid.
+    edge : (N,)
+        Posterior weight at the ends of the grid of ln σ: large where the levels show no slope.
     """
 
     location: np.ndarray
@@ -103,14 +115,20 @@ class Estimate:
     lapse: np.ndarray
     side: np.ndarray
     best: np.ndarray
-    edge: (
-        np.ndarray
-    )  # (N,) posterior weight at the ends of the grid of ln σ: large where the levels show no slope
+    edge: np.ndarray
 
 
 @dataclass(frozen=True)
 class Goodness:
-    """Goodness of fit of one person: the deviance, and how often a fitted function itself gives a larger one."""
+    """Goodness of fit of one person.
+
+    Attributes
+    ----------
+    deviance : float
+        Twice the logarithm of the likelihood of perfect proportions over that of the fitted ones.
+    p : float
+        Share of repetitions, simulated from the fitted function, whose deviance is larger.
+    """
 
     deviance: float
     p: float
@@ -167,7 +185,13 @@ class Psychometric:
         return np.asarray(guess + (1.0 - guess - lapse) * core)
 
     def axes(self, levels: np.ndarray) -> _Axes:
-        """Return the nodes of μ, ln σ, λ, γ and b for the span of these levels."""
+        """Return the nodes of μ, ln σ, λ, γ and b for the span of these levels.
+
+        Raises
+        ------
+        UsageError
+            If all levels are the same.
+        """
         low, high = float(levels.min()), float(levels.max())
         span = high - low
         if not span > 0.0:

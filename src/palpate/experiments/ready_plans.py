@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -97,23 +98,18 @@ KINDS = {
 
 
 def ready_plan(kind: str, name: str, bodies: Sequence[str | Path]) -> str:
-    """Return the text of a plan.
+    """Return the text of a plan of a kind of `KINDS`, with the experiment's name in letters and digits.
 
-    Parameters
-    ----------
-    kind : str
-        A word of `KINDS`.
-    name : str
-        Name of the experiment, letters and digits.
-    bodies : sequence of path
-        Files of learnt bodies, the reference first; of discrimination one is enough.
-
-    Raises
-    ------
-    UsageError
-        If the kind is unknown, or a file is missing from the list.
+    `bodies` are files of learnt bodies, the reference first; of discrimination one is enough. An unknown kind, a name
+    with other signs, or a file too few, is a UsageError.
     """
     kind = checks.one_of("The kind of plan", kind, tuple(KINDS))
+    if not re.fullmatch("[A-Za-z0-9]+", name):
+        raise UsageError(
+            f"{name!r} is no name of an experiment.",
+            why="It stands in the names of files, of which BIDS asks for letters and digits alone.",
+            fix="Give a name such as stiffness or kidney2.",
+        )
     files = [str(b) for b in bodies]
     if kind == "discrimination" and len(files) == 1:
         files *= 2

@@ -18,11 +18,27 @@ __all__ = ["Simulated", "simulate_course", "simulate_people"]
 
 @dataclass(frozen=True)
 class Simulated:
-    """What a course gives of simulated people, beside what is true of them.
+    """Estimates of a course of simulated people, beside what is true of them; of the form ``correct`` JND stands for σ.
 
-    Coverages are shares of the people whose 95 % interval holds the truth. `bias` is that of the JND's geometric mean,
-    as a share; of the form ``correct`` JND stands for σ. `location_bias` and `width` are in the levels' unit and as
-    ln(upper/lower); `reversals_bias` is that of a staircase's mean reversal.
+    Attributes
+    ----------
+    people, trials : int
+        Number of people, and of trials of each.
+    location_coverage, spread_coverage : float
+        Shares of the people whose 95 % interval of μ, and of the JND, holds the truth.
+    location_bias : float
+        Mean error of μ, in the unit of the levels.
+    bias : float
+        Bias of the geometric mean of the JND, as a share.
+    scatter : float
+        Standard deviation of ln JND.
+    width : float
+        Mean ln(upper/lower) of the JND's interval.
+    caught : float, optional
+        Share of the catch trials that were answered rightly; None without any.
+    reversals_bias : float, optional
+        Bias of a staircase's mean reversal, as a share, of the form ``correct`` of what the levels are logarithms of;
+        None of another placement.
     """
 
     people: int
@@ -31,8 +47,8 @@ class Simulated:
     spread_coverage: float
     location_bias: float
     bias: float
-    scatter: float  # standard deviation of ln JND
-    width: float  # mean ln(upper/lower) of the JND's interval
+    scatter: float
+    width: float
     caught: float | None
     reversals_bias: float | None
 
@@ -83,7 +99,21 @@ def simulate_course(
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> Simulated:
-    """Return how a course does on so many simulated people of one kind."""
+    """Return how a course does on simulated people of one kind.
+
+    Parameters
+    ----------
+    course : Course
+        Trials of one condition.
+    observer : Observer
+        The person who answers.
+    people : int
+        Number of simulated people.
+    seed : int
+        Seed of courses and answers.
+    progress : callable, optional
+        Takes a line when all have answered.
+    """
     rng = np.random.default_rng(seed)
     state = simulate_people(course, observer, people, rng)
     if progress is not None:
@@ -118,7 +148,6 @@ def _reversals_bias(course: Course, state: Progress, observer: Observer) -> floa
     guess = 0.5 if course.function.form == "signed" else float(np.mean(course.function.guess))
     reached = stairs.threshold(state.placed)
     if course.function.form == "signed":  # with no bias, p correct = Φ(|x|/σ)
-        true = observer.spread * float(ndtri(stairs.target))
-    else:
-        true = observer.location + observer.spread * float(ndtri((stairs.target - guess) / (1.0 - guess)))
-    return float(np.nanmean(reached) / true - 1.0)
+        return float(np.nanmean(reached) / (observer.spread * float(ndtri(stairs.target))) - 1.0)
+    true = observer.location + observer.spread * float(ndtri((stairs.target - guess) / (1.0 - guess)))
+    return float(np.expm1(np.nanmean(reached) - true))  # levels are logarithms: their ratio has no meaning

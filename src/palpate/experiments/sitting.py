@@ -6,11 +6,13 @@ answers lead to the same trials, so that a sitting that was interrupted is broug
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.experiments.course import Next
 from palpate.experiments.experiment_plan import Plan
 
@@ -37,6 +39,11 @@ class Trial:
     def target(self) -> int:
         """Interval, from 1, of the comparison; 0 where it plays no part."""
         return next((k for k, body in enumerate(self.bodies, 1) if body != "reference"), 0)
+
+    def stands_in(self, row: Mapping[str, Any]) -> bool:
+        """Return whether a row of a table is of this trial."""
+        bodies, level = row.get("intervals", ",".join(self.bodies)), float(row.get("level", self.level))
+        return bodies == ",".join(self.bodies) and abs(level - self.level) <= 1e-6
 
     def is_correct(self, response: int) -> bool:
         """Return whether an answer, the number of an interval, is right."""
@@ -124,12 +131,20 @@ class Sitting:
         return trial
 
     def restore(self, rows: list[dict[str, Any]]) -> None:
-        """Bring back a sitting from the rows of its table."""
+        """Bring back a sitting from the rows of its table; rows of other trials than are drawn again are refused."""
         for row in rows:
+            trial = self.next()
+            if trial is None or not trial.stands_in(row):
+                raise UsageError(
+                    f"The sitting of {self.participant} can't go on.",
+                    why=f"Row {self.done + 1} of its table is of another trial than the plan draws: the table was "
+                    "changed, or another version or processor chose its levels.",
+                    fix=f"Go on where it was begun, or begin another sitting with --run {self.run + 1}.",
+                )
             self.answer(int(row["response"]) if str(row["response"]).isdigit() else 0)
 
     @property
     def break_is_due(self) -> bool:
-        """Whether a break comes before the next trial."""
+        """True where a break comes before the next trial."""
         counted = self._done - self.plan.sitting.practice
         return 0 < counted < len(self._mix) and counted % self.plan.sitting.break_every == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 import shutil
@@ -146,7 +147,9 @@ class Stimuli:
         source, vary, body = self.files[name], self.plan.vary, self.bodies[name]
         assert vary.place is not None
         lump = Lump(vary.place, radius, vary.stiffer)
-        file = self.folder / f"{source.stem}-lump-{radius:.9f}.palpate"
+        # a plan may move its lump until the first sitting: a file of another place must not be felt
+        where = hashlib.sha256(repr(lump).encode()).hexdigest()[:8]
+        file = self.folder / f"{source.stem}-lump-{radius:.9f}-{where}.palpate"
         if not file.exists():
             if (cover := place_of(body, lump).cover) < LEAST_COVER:
                 raise UsageError(

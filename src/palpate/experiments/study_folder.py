@@ -31,6 +31,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.errors import FileFormatError, UsageError
+from palpate.experiments.append_record import hold_file
 from palpate.experiments.experiment_plan import Plan, read_plan
 from palpate.files import system_errors, write_file
 
@@ -108,15 +109,10 @@ class StudyFolder:
 
     def prepare(self, plan_file: Path) -> None:
         """Make the folder with its descriptions; a plan that has changed since the first sitting is refused."""
-        kept = self.root / "plan.toml"
-        if kept.exists():
-            if kept.read_bytes() != plan_file.read_bytes():
-                raise UsageError(
-                    f"{plan_file} has changed since the first sitting.",
-                    why=f"All sittings of an experiment follow one plan; {kept} is the one they began with.",
-                    fix="Put the plan back, or give the changed one another name.",
-                )
+        self.require_plan(plan_file)
+        if (self.root / "plan.toml").exists():
             return
+        self._require_own()
         with system_errors(f"Could not write {self.root}."):
             (self.root / "stimuli").mkdir(parents=True, exist_ok=True)
         from palpate.version import __version__
@@ -131,7 +127,32 @@ class StudyFolder:
         write_file(self.root / "participants.json", _json(PEOPLE))
         write_file(self.root / f"task-{self.plan.name}_events.json", _json(self.columns))
         write_file(self.root / "participants.tsv", "\t".join(PEOPLE) + "\n")
-        write_file(kept, plan_file.read_bytes())
+        write_file(self.root / "plan.toml", plan_file.read_bytes())
+
+    def require_plan(self, plan_file: Path) -> None:
+        """Refuse a plan that has changed since the first sitting."""
+        kept = self.root / "plan.toml"
+        if kept.exists() and kept.read_bytes() != plan_file.read_bytes():
+            raise UsageError(
+                f"{plan_file} has changed since the first sitting.",
+                why=f"All sittings of an experiment follow one plan; {kept} is the one they began with.",
+                fix="Put the plan back, or give the changed one another name.",
+            )
+
+    def _require_own(self) -> None:
+        """Refuse a folder without a plan that holds something else than an earlier start has left."""
+        own = {"stimuli", "dataset_description.json", "participants.json"}
+        own.add(f"task-{self.plan.name}_events.json")
+        table = self.root / "participants.tsv"
+        if not (table.exists() and read_table(table)):
+            own.add(table.name)
+        there = {p.name for p in self.root.glob("[!.]*")}
+        if others := sorted(there - own):
+            raise UsageError(
+                f"{self.root} is there already, and is no experiment's folder.",
+                why=f"It holds {', '.join(others[:3])}, and nothing is ever overwritten.",
+                fix="Give the plan another name.",
+            )
 
     @property
     def columns(self) -> dict[str, dict[str, Any]]:
@@ -156,7 +177,15 @@ class StudyFolder:
             yield path.name.partition("_")[0], path
 
     def sitting(self, participant: Participant, run: int) -> SittingFiles:
-        """Return the files of a sitting."""
+        """Return the files of a sitting; a label that another one equals but for its case is refused."""
+        if alike := {p for p in self.people() if p.lower() == participant.label.lower()} - {
+            participant.label
+        }:
+            raise UsageError(
+                f"{participant.label} and {min(alike)} differ by their case alone.",
+                why="Some file systems take them for one person.",
+                fix="Number the participants: sub-01, sub-02, …",
+            )
         folder = self.root / participant.label / "beh"
         with system_errors(f"Could not write {folder}."):
             folder.mkdir(parents=True, exist_ok=True)
@@ -175,7 +204,8 @@ class StudyFolder:
                 why=f"It holds {', '.join(self.people()) or 'nobody'}.",
                 fix="Name one of them.",
             )
-        count = sum(1 for p in folder.rglob("*") if p.is_file()) if folder.exists() else 0
+        _require_free(folder)
+        count = sum(1 for p in folder.rglob("*") if p.is_file() and not p.name.startswith("."))
         with system_errors(f"Could not remove {folder}."):
             if folder.exists():
                 shutil.rmtree(folder)
@@ -235,33 +265,27 @@ class SittingFiles:
     def held(self) -> Iterator[None]:
         """Hold the sitting: no other process goes on with it meanwhile. A killed process lets go by itself."""
         path = self.folder / f".{self.stem}.lock"
-        with system_errors(f"Could not write {path}."), path.open("a+b") as file:
-            if not _locked(file):
+        with system_errors(f"Could not write {path}."):
+            file = path.open("ab")
+        with file:
+            if not hold_file(file):
                 raise UsageError(
                     f"The sitting {self.stem} is being run by another process.",
                     fix="Go on there, or end it first.",
                 )
-            try:
-                yield
-            finally:
-                with contextlib.suppress(OSError):
-                    path.unlink()
+            yield  # the file stays: one that is removed here could be locked by two at once
 
 
-def _locked(file: Any) -> bool:
-    """Return whether this process now holds a lock on a file."""
-    try:
-        if os.name == "nt":
-            import msvcrt
-
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
-        else:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
+def _require_free(folder: Path) -> None:
+    """Refuse to go on where another process runs a sitting in a person's folder."""
+    for path in folder.glob("beh/.*.lock"):
+        with path.open("ab") as file:
+            if not hold_file(file):
+                raise UsageError(
+                    f"A sitting of {folder.name} is being run.",
+                    why="It would write down more.",
+                    fix="End it first.",
+                )
 
 
 def append_row(path: Path, cells: list[Any]) -> None:
@@ -278,6 +302,8 @@ def read_table(path: Path) -> list[dict[str, str]]:
     with system_errors(f"Could not read {path}."):
         text = path.read_text("utf-8")
     rows = list(csv.DictReader(io.StringIO(text), delimiter="\t", quoting=csv.QUOTE_NONE))
+    if rows and not text.endswith("\n") and None in rows[-1].values():
+        del rows[-1]  # a kill has cut it off
     if any(None in row or None in row.values() for row in rows):
         raise FileFormatError(
             f"{path} has a line with too few or too many columns.",

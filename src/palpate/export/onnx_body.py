@@ -87,10 +87,7 @@ def add_body(graph: Graph, energy: LearntEnergy, *, apart: bool = False) -> None
 def add_torque(graph: Graph, surrogate: Surrogate) -> None:
     """Add the output ``torque`` (N, 3), N m, of a tool whose torque was learnt, to the graph of its energy.
 
-    Raises
-    ------
-    UsageError
-        For a tool whose torque is a slope of its energy by its turn, which the graph does not have.
+    A tool whose torque is a slope of its energy by its turn is refused: the graph does not have that slope.
     """
     arm = surrogate.quantities.get(ARM)
     if arm is None:

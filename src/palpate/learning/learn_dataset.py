@@ -219,11 +219,7 @@ def learn(
     areas = {} if painted is None else {"painted": painted.record(), "solved_at": train.ok.X.tolist()}
     rows = np.arange(solves) if known.rows is None else known.rows
     found = found.renumber(np.where(rows < 0, -1, numbers[rows]))
-    meta = {**found.meta, **known.meta, **areas, "name": name, "dataset": origin}
-    if found.suspects:
-        meta["suspects"] = [vars(one) for one in found.suspects]
-    if excluded:
-        meta["excluded"] = excluded
+    meta = {**found.meta, **known.meta, **areas, "name": name, "dataset": origin, **_doubts(found, excluded)}
     beside = _learn_beside(known, options, limit(1.0), log)
     memory, fit = (None, None) if known.memory is None else known.memory(energy)
     if memory is not None:
@@ -235,6 +231,12 @@ def learn(
     return surrogate, LearningHistory(
         found, solves, spent, learnt, known.filter, quantities=beside, memory=fit
     )
+
+
+def _doubts(found: EnergyHistory, excluded: list[int]) -> dict[str, Any]:
+    """Return what the record says of solves that contradict their neighbours or were left out; nothing without."""
+    suspects = {"suspects": [vars(one) for one in found.suspects]} if found.suspects else {}
+    return suspects | ({"excluded": excluded} if excluded else {})
 
 
 def _learn_beside(

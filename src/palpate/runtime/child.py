@@ -73,7 +73,9 @@ def _run(options: SimpleNamespace) -> int:
     if traits.damping is not None:  # motors: what the opened device says of itself may not be exceeded
         radius, max_force = min(radius, traits.radius), min(max_force, traits.max_force)
     workspace = model.workspace(radius)
-    limits = Limits(max_force, options.slew, continuous=traits.continuous_force)
+    limits = Limits(
+        max_force, options.slew, continuous=traits.continuous_force, max_torque=options.max_torque
+    )
     loop = Loop(
         model,
         device,

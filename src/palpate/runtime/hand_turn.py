@@ -37,6 +37,8 @@ _NORM = 0.01  # by how much the length of a quaternion may differ from 1
 _FASTEST, _LONGEST = 30.0, 0.01  # rad/s: no wrist turns faster; s of still samples that a leap may have
 _SHORTEST = 1e-3  # s between two samples
 _STILL = [0.0, 0.0, 0.0]
+# cosine of how far from w = 0 a hand turns the tool, at most: beyond half a turn w would leap to the other side
+_FARTHEST = math.cos(3.0)
 _PATIENCE = 3  # impossible orientations in a row that are a fault
 _UPRIGHT = np.array(
     [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
@@ -116,11 +118,19 @@ class HandTurn:
             self._doubts, self.fault = 0, False
             if self._held and holding:
                 self.angle += step
-                self.tool = change @ self.tool
+                self._turn_tool(change)
             self._held = holding
         if self._doubts == 0 or (whole and self.fault):  # after a fault the newest one is believed again
             self._since = self._since if step == _STILL else 0.0
             self._hand[:] = new
+
+    def _turn_tool(self, change: np.ndarray) -> None:
+        """Turn the tool by a rotation (3, 3); not on beyond where its rotation vector is one and the same."""
+        turned = change @ self.tool
+        whole = len(self._inputs) == 3
+        cosine = 0.5 * (float(turned.trace()) - 1.0) if whole else float(self._axis @ turned @ self._axis)
+        if cosine > _FARTHEST:
+            self.tool = turned
 
     def into(self, parameters: np.ndarray) -> None:
         """Put the turn into the further inputs (p,) that turn the tool; where nobody holds it, begin from them."""

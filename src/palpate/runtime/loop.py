@@ -24,7 +24,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -447,7 +446,7 @@ class Loop:
         gate = self.open and self.fault is Fault.NONE
         answer, turn, torque = self.evaluator, self.turn, self.turn_torque
         if turn is None or torque is None:
-            np.multiply(answer.torque, float(gate), out=self.out.torque)
+            self.out.torque[:] = answer.torque if gate else 0.0  # times zero, not-a-number would be published
             return
         elapsed, free = self.now - self._before, not answer.torque.any() and not torque.torque.any()
         stored = self._stored() / self.workspace.scale
@@ -472,22 +471,28 @@ class Loop:
         """Push on the hand."""
         self.frame.to_device(self._sent, self._sent_to_device)
         try:
-            if self.turn_torque is None:
-                self.device.write(self._sent_to_device)
-            else:
-                self.device.write(self._sent_to_device, self._turn_sent)  # type: ignore[call-arg]  # renders both
+            self._write_wrench()
         except Exception as error:  # noqa: BLE001 - as for `read`
             if self.turn_torque is not None:
                 self.turn_torque.stop()
             self.safety.stop()  # nobody knows what was sent: don't claim it, and ramp in again
+            self.out.torque[:] = 0.0
             self.passivity.amend()
             self.device_failed(error)
+
+    def _write_wrench(self) -> None:
+        """Give the device its force, and the torque too where it renders one."""
+        if self.turn_torque is None:
+            self.device.write(self._sent_to_device)
+        else:
+            self.device.write(self._sent_to_device, self._turn_sent)  # type: ignore[call-arg]  # renders both
 
     def end(self) -> None:
         """Send and publish zero force, whatever happened before, and close the device."""
         self.safety.stop()
         self.out.end()
-        for last in (partial(self.device.write, self.safety.force), self.device.close):
+        self._sent_to_device[:] = self._turn_sent[:] = 0.0
+        for last in (self._write_wrench, self.device.close):
             try:
                 last()
             except Exception as error:  # noqa: BLE001 - as for `read`

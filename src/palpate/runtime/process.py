@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import queue
 import subprocess
@@ -57,6 +58,8 @@ class LoopProcess:
         Radius, m; the device's own by default.
     max_force : float, optional
         N; the device's own by default.
+    max_torque : float, optional
+        N m, of a device that renders a torque; the device's own by default.
     slew : float
         N/s; 0 chooses full force in 20 ms.
     unsoftened : bool
@@ -94,6 +97,7 @@ class LoopProcess:
         rate: float = 1000.0,
         workspace: float | None = None,
         max_force: float | None = None,
+        max_torque: float | None = None,
         slew: float = 0.0,
         unsoftened: bool = False,
         controller: bool = True,
@@ -118,6 +122,7 @@ class LoopProcess:
             "rate": float(rate),
             "radius": float(traits.radius if workspace is None else workspace),
             "max_force": float(traits.max_force if max_force is None else max_force),
+            "max_torque": math.inf if max_torque is None else float(max_torque),
             "slew": float(slew),
             "unsoftened": unsoftened,
             "control": controller,

@@ -142,6 +142,7 @@ class Publisher:
     def end(self) -> None:
         """Publish a last record: nothing held, nothing pushed."""
         self._views["grabbed"][()] = False
+        self.torque[:] = 0.0
         if self._count < _EVERY:
             self._pace(float(self._views["time"]) - self.offset)
         self._block.publish()

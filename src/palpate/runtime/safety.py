@@ -105,11 +105,16 @@ class Limits:
     max_torque: float = math.inf  # N m, largest ‖τ‖ of a device that renders one, beside its own
 
     def __post_init__(self) -> None:
-        positive = self.max_force > 0.0 and self.continuous > 0.0 and self.max_torque > 0.0
+        positive = self.max_force > 0.0 and self.continuous > 0.0
         if not (positive and self.max_force < math.inf and 0.0 <= self.slew < math.inf):
             raise UsageError(
                 f"A force limit of {self.max_force:g} N and a slew of {self.slew:g} N/s protect nobody.",
                 fix="Give positive, finite limits.",
+            )
+        if not self.max_torque > 0.0:
+            raise UsageError(
+                f"A torque limit of {self.max_torque:g} N m is none.",
+                fix="Give a positive one, or leave it out.",
             )
         if not _SHORTEST_RAMP <= self.ramp < math.inf:
             raise UsageError(

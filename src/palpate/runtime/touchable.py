@@ -25,7 +25,6 @@ from palpate.errors import UsageError
 from palpate.runtime.hand_evaluator import HandEvaluator
 from palpate.runtime.workspace import Workspace
 from palpate.surrogates import Field, LearntEnergy, LearntQuantities, NodeField, Surrogate, TouchedSurface
-from palpate.surrogates.baselines import PosedBaseline, deepest_ball
 from palpate.surrogates.fields import line_of
 from palpate.surrogates.learnt_torque import ARM, torque_evaluator
 from palpate.surrogates.memories import Friction, Memory
@@ -79,7 +78,7 @@ class Touchable:
     @property
     def friction(self) -> Friction | None:
         """The friction of the tool on it; None without."""
-        return self.memory if isinstance(self.memory, Friction) else None
+        return None if self.memory is None else self.memory.friction
 
     def with_friction(self, kinetic: float, static: float | None = None) -> Touchable:
         """Return the same body with another friction, pure numbers; the same value where it has just that."""
@@ -105,8 +104,7 @@ class Touchable:
 
         `surface` is the body's less this way, so that it takes places; all of it where a tool turns.
         """
-        posed = isinstance(self.energy.baseline, PosedBaseline)
-        return np.zeros(3) if self.tool is None or posed else deepest_ball(self.tool, self.normal)[1]
+        return np.zeros(3) if self.tool is None else self.energy.baseline.surface_shift(self.normal)
 
     @property
     def holds(self) -> bool:

@@ -8,7 +8,7 @@ interaction_records  what acts on a surface, and `[[varied]]`
 quantities           frozen tables with quantities that may carry units
 toml                 the record as a TOML file with comments, and back
 named_studies        studies that have a name
-part_study           study of a part that the user has
+part_study           study of a part that the user has, and region_choices its materials and labels as they are typed
 study_lock           one command at a time for the files of a study
 run                  the stages: sweep, load the data, learn, validate, report
 improve_study        a study whose solves are chosen batch by batch, until a force error is reached

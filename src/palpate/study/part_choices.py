@@ -31,7 +31,7 @@ from palpate.study.tool_kind import ToolRecord
 if TYPE_CHECKING:
     from palpate.viewer.shown_part import PartChoices, ShownMaterial, ShownPart
 
-__all__ = ["LAWS", "chosen_study", "shown_part"]
+__all__ = ["LAWS", "chosen_study", "judge_region", "shown_part"]
 
 LAWS = ("neo-hookean", "st-venant-kirchhoff", "linear-elastic")
 """Laws that take Young's modulus and Poisson's ratio alone."""
@@ -70,11 +70,11 @@ def shown_part(study: Study) -> ShownPart:
         materials={name: _shown_material(name) for name in MATERIALS if _is_for_solids(name)},
         laws=LAWS,
         notes=tuple(bare.notes),
-        judge_region=judge_region,
+        judge_region=_region_material,
     )
 
 
-def judge_region(region: str, text: str) -> RegionMaterial:
+def _region_material(region: str, text: str) -> RegionMaterial:
     """Return the material of a region by its text, or refuse the text."""
     return RegionMaterial.of_text(region, text, POISSON)
 
@@ -128,7 +128,7 @@ def _choose_regions(content: dict[str, Any], before: dict[str, str], choices: Pa
         content["varied"] = [entry for entry in content["varied"] if entry["path"] != path]
         materials.pop(region, None)
         if text:
-            chosen = judge_region(region, text)
+            chosen = _region_material(region, text)
             materials[region] = chosen.table
             content["varied"] += [chosen.varied] if chosen.varied else []
     content["body"]["materials"] = materials
@@ -149,7 +149,7 @@ def _parts(study: Study) -> tuple[PartRecord, ProbeRecord | ToolRecord]:
         raise UsageError(
             f"The study {study.name} is not of a part under a ball or a tool.",
             why="Only such a study is set up on the page.",
-            fix="Carry it out with `palpate study`, and look at it with `palpate view`.",
+            fix="Carry it out with `palpate sweep` and `palpate learn`, and look at it with `palpate view`.",
         )
     return body, acting
 

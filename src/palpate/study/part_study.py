@@ -82,40 +82,8 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     unit, faces = _read_scan(path, labels, options) if is_scan else _read(path, options.unit, options.wrap)
     low = np.min([face.lower for face in faces], axis=0)
     high = np.max([face.upper for face in faces], axis=0)
-    footprint = float(np.prod((high - low)[:2]))
-    radius, touched = options.radius, options.touched
-    if radius is None:
-        least = float((high - low).min())
-        radius = _nice(min(max(RADIUS * least, math.sqrt(footprint / CELLS) / COARSE), LARGEST * least))
-    element = _element_size(options.element, footprint, radius)
-    deepest = _nice(DEPTH * radius) if options.depth is None else options.depth
-    fixed, named = _support(faces, float(low[2]), float(high[2] - low[2]))
-    if options.held:
-        fixed, named = tuple(options.held), []
-    content: dict[str, Any] = {
-        "name": study_name(path, options.name),
-        "body": {
-            "kind": "part",
-            "file": str(path),
-            "unit": unit,
-            "wrap": options.wrap,
-            "labels": labels,
-            "up": options.up,
-            "material": _material(options),
-            "fixed": fixed,
-            "surfaces": named,
-        },
-        "interaction": {
-            "kind": "probe",
-            "touches": touched or TOUCHED,
-            "radius": radius,
-            "depth": (_nice(LEAST_DEPTH * deepest), deepest),
-        },
-        "sweep": {"samples": 60, "depths": 3, "element": element},
-        "test": {"samples": 24, "depths": 2},  # many places: several depths of one tell less
-    }
-    if is_scan:  # its surfaces are as fine as what lies under the ball, and are round there
-        content["body"]["element"] = element
+    content, named = _first_content(path, unit, faces, low, high, options)
+    element, touched = content["sweep"]["element"], options.touched
     regions = _shape_of(content["body"]).regions
     poisson = POISSON if options.poisson is None else options.poisson
     materials = region_materials(options.materials, regions, poisson)
@@ -132,6 +100,52 @@ def part_study(file: str | os.PathLike[str], *, options: PartOptions) -> tuple[S
     if options.tool is not None:
         study = _with_tool(study, options)
     return study, tuple(_notes(path, unit, faces, regions, low, high))
+
+
+def _first_content(
+    path: Path,
+    unit: str | None,
+    faces: Sequence[Face],
+    low: np.ndarray,
+    high: np.ndarray,
+    options: PartOptions,
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return the tables of a study under a ball, and the surfaces they name, of a part between corners (3,) in m."""
+    footprint = float(np.prod((high - low)[:2]))
+    radius = options.radius
+    if radius is None:
+        least = float((high - low).min())
+        radius = _nice(min(max(RADIUS * least, math.sqrt(footprint / CELLS) / COARSE), LARGEST * least))
+    element = _element_size(options.element, footprint, radius)
+    deepest = _nice(DEPTH * radius) if options.depth is None else options.depth
+    fixed, named = _support(faces, float(low[2]), float(high[2] - low[2]))
+    if options.held:
+        fixed, named = tuple(options.held), []
+    content: dict[str, Any] = {
+        "name": study_name(path, options.name),
+        "body": {
+            "kind": "part",
+            "file": str(path),
+            "unit": unit,
+            "wrap": options.wrap,
+            "labels": read_labels(options.labels),
+            "up": options.up,
+            "material": _material(options),
+            "fixed": fixed,
+            "surfaces": named,
+        },
+        "interaction": {
+            "kind": "probe",
+            "touches": options.touched or TOUCHED,
+            "radius": radius,
+            "depth": (_nice(LEAST_DEPTH * deepest), deepest),
+        },
+        "sweep": {"samples": 60, "depths": 3, "element": element},
+        "test": {"samples": 24, "depths": 2},  # many places: several depths of one tell less
+    }
+    if part_kind(path) == "scan":  # its surfaces are as fine as what lies under the ball, and are round there
+        content["body"]["element"] = element
+    return content, named
 
 
 def _with_tool(study: Study, options: PartOptions) -> Study:

@@ -1,4 +1,4 @@
-"""What presses a part: a ball, or a tool in sizes that suit the part, and the tables of its study under either."""
+"""The tool that presses a part: a ball, or one in sizes that suit it, and the tables of its study under either."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def under_tool(content: dict[str, Any], name: str, tool: PosedTool) -> dict[str,
     """
     acting, sweep = content["interaction"], dict(content["sweep"])
     known = {key: acting[key] for key in ("touches", "depth")}
-    known |= {key: acting[key] for key in ("pad", "over") if acting["kind"] == "tool"}
+    known |= {key: acting[key] for key in ("pad", "over", "turns", "tilt") if acting["kind"] == "tool"}
     sweep.pop("symmetric", None)
     if sweep.get("element") is not None:
         finest = max(

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from palpate.learning.pressed_solves import FEWEST
 from palpate.options import EnergyOptions, Options, declarations
-from palpate.records import Count, Metres, Newtons, Number, Record
+from palpate.records import Count, Metres, NewtonMetres, Newtons, Number, Record
 
 if TYPE_CHECKING:
     from palpate.validation import Limits
@@ -130,6 +130,12 @@ class RuntimeRecord(Record):
 
     rate: Number = Field(1000.0, ge=10, le=10000, description="Hz")
     max_force: Newtons = Field(12.0, gt=0, description="largest force; the force is limited to this")
+    max_torque: NewtonMetres | None = Field(
+        None,
+        gt=0,
+        description="largest torque on a device that renders one; left out: the device's own limit",
+        examples=["50 mN m"],
+    )
     friction: Number | None = Field(
         None,
         ge=0,

@@ -1,4 +1,4 @@
-"""How quickly a body may be moved so that its static answers hold.
+"""The speed limit of a body: how quickly it may be moved so that its static answers hold.
 
 Driven at a frequency f, a body's lowest mode of frequency f₀ answers by a(f) = 1/(1 − (f/f₀)²) of its static answer.
 Higher modes answer less, so the error of a static answer is at most a − 1.

@@ -1,4 +1,4 @@
-"""What the record of a learnt body tells of its training and of measurements that have corrected it."""
+"""The record of a learnt body: its training, and measurements that have corrected it."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ def _plan_in(plan: Path) -> dict[str, object]:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a sweep is, by its files."""
+    """The progress of a sweep, by its files."""
 
     solved: int  # rows that are on disk, with those that failed
     failed: int

@@ -51,7 +51,7 @@ _KEPT = "What is solved is kept where the sweep has a path: the same command goe
 
 @dataclass(frozen=True)
 class Machines:
-    """What a sweep runs on."""
+    """The machines that a sweep runs on."""
 
     client: distributed.Client
     revive: Callable[[], None]  # starts dead workers again
@@ -156,12 +156,7 @@ def run(
 
     The inputs `points` (N, n) are solved by `chains` of their rows, a case within `case_limit` seconds, and `accept`
     takes rows and their answers. The schema has the bookkeeping too; `slowest` is the longest time of a case in s that
-    is known.
-
-    Raises
-    ------
-    ResourceError
-        If the scheduler is lost, or a chain takes longer than a job may.
+    is known. A scheduler that is lost, and a chain that takes longer than a job may, are ResourceErrors.
     """
     client, finished = machines.client, queue.SimpleQueue[Any]()
     waiting = collections.deque(_Chain(rows) for rows in chains)
@@ -209,7 +204,7 @@ def run(
 
 
 class _Ahead:
-    """How many chains are handed in at once: enough to keep all workers busy, which come and go."""
+    """The number of chains that are handed in at once: enough to keep all workers busy, which come and go."""
 
     def __init__(self, machines: Machines) -> None:
         self._machines, self._looked, self._most = machines, -math.inf, 0

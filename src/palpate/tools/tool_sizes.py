@@ -61,7 +61,7 @@ _ABOUT = {
 
 def about(name: str) -> str:
     """Return what a tool is in a few words."""
-    return _ABOUT[name]
+    return _ABOUT.get(name, "a tool from a file, in the sizes that it has there")
 
 
 def size_unit(size: str) -> str:
@@ -70,11 +70,9 @@ def size_unit(size: str) -> str:
 
 
 def sizes_of(tool: PosedTool) -> dict[str, float]:
-    """Return the sizes of a tool by their names, in m and rad; one from a file has those of its turn alone."""
-    shape = tool.shape
-    own = {}
-    if not isinstance(shape, ScannedTool):
-        own = {field.name: float(getattr(shape, field.name)) for field in fields(shape)}  # type: ignore[arg-type]
+    """Return the sizes of a tool by their names, in m and rad; those of a tool from a file are its turns alone."""
+    sized = () if isinstance(tool.shape, ScannedTool) else fields(tool.shape)  # type: ignore[arg-type]
+    own = {field.name: float(getattr(tool.shape, field.name)) for field in sized}
     return own | dict(zip(TURNS, tool.rotation, strict=True))
 
 
@@ -92,25 +90,38 @@ def suitable_tool(name: str, radius: float) -> PosedTool:
 
 
 def tool_by_name(name: str, sizes: Mapping[str, float]) -> PosedTool:
-    """Return a tool by its name and all of its sizes in m and rad."""
+    """Return a tool by its name and all of its sizes in m and rad.
+
+    Raises
+    ------
+    UsageError
+        For a name that is not known, or sizes that are not those of this tool.
+    """
+    usual = _usual(name)
     own = {key: value for key, value in sizes.items() if key not in TURNS}
+    wanted = [key for key in sizes_of(PosedTool(usual)) if key not in TURNS]
+    if set(own) != set(wanted):
+        raise UsageError(
+            f"The sizes of a {name} are {', '.join(wanted)}.", why=f"Given are {', '.join(own) or 'none'}."
+        )
     a, b, c = (sizes.get(key, 0.0) for key in TURNS)
-    return PosedTool(replace(_usual(name), **own), (a, b, c))  # type: ignore[type-var]
+    return PosedTool(replace(usual, **own), (a, b, c))  # type: ignore[type-var]
 
 
 def read_tool(text: str, radius: float, known: PosedTool | None = None) -> tuple[str, PosedTool | None]:
     """Return name and tool of a text such as ``capsule, radius 6 mm, length 24 mm``; no tool for a ball.
 
     Sizes that are left out go with a ball of a radius in m, or are those of a `known` tool of this shape.
-
-    Raises
-    ------
-    UsageError
-        For a name or a size that is not known, or a text that is no quantity.
+    A name or a size that is not known, or a text that is no quantity, is a UsageError.
     """
     name, *parts = (part.strip() for part in text.replace(":", ",").replace(";", ",").split(","))
     name = name.lower()
-    if name == BALL and not parts:
+    if name == BALL:
+        if any(parts):
+            raise UsageError(
+                "A ball's radius is not said with its name.",
+                fix='Give it with --radius, or take a "sphere, radius 6 mm", whose place is its foremost point.',
+            )
         return name, None
     tool = suitable_tool(name, radius)
     if known is not None and type(known.shape) is type(tool.shape):

@@ -122,8 +122,7 @@ class _Page:
     def of(cls, surrogate: Surrogate) -> _Page:
         """Return the page of a body with as many of its fields as it has room for."""
         surrogate = _shallow(surrogate)
-        known = [field.name for field in surrogate.fields.values()]
-        surrogate = _exported(surrogate)
+        known, surrogate = [field.name for field in surrogate.fields.values()], _exported(surrogate)
         model = PageModel(touchable(surrogate))
         traits = device_traits("page")
         place = model.body.workspace(traits.radius)
@@ -156,11 +155,8 @@ class _Page:
         left_out = tuple(name for name in known if name not in kept)
         card = card_of(surrogate).with_hash(f"{bare.label}, of a page", bare.hash)
         missing = {"fields that are not in this file": ", ".join(left_out)} if left_out else {}
-        hello = replace(
-            hello,
-            fields=tuple(info for info in hello.fields if info.name in kept),
-            meta=about_record(surrogate.meta) | about_record(_card_in_words(card)) | missing,
-        )
+        hello = replace(hello, fields=tuple(info for info in hello.fields if info.name in kept))
+        hello = replace(hello, meta=_meta(surrogate, card) | missing)
         for i, field in enumerate(fields):
             parts[f"field-{i}"] = field.modes
             if i > 0:
@@ -189,7 +185,7 @@ class _Page:
             "fields": [],
             "line": line_facts(line, surrogate),
         }
-        hello = replace(hello, meta=about_record(surrogate.meta) | about_record(_card_in_words(card)))
+        hello = replace(hello, meta=_meta(surrogate, card))
         parts = {
             "core": pack(built_core("core.wasm")),
             "weights-0": pack(shuffle_words(block.to_bytes())),
@@ -220,6 +216,11 @@ class _Page:
             for i, field in enumerate(self.fields)
         }
         return replace(whole, parts={**whole.parts, **parts})
+
+
+def _meta(surrogate: Surrogate, card: ModelCard) -> dict[str, Any]:
+    """Return the record of a body and its card as the page shows them."""
+    return about_record(surrogate.meta) | about_record(_card_in_words(card))
 
 
 def _shallow(surrogate: Surrogate) -> Surrogate:

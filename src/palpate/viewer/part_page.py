@@ -18,7 +18,7 @@ import contextlib
 import logging
 import os
 import threading
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Unpack
@@ -249,7 +249,7 @@ class PartPage(LocalServer):
             body = replace(load_touchable(path), name=self.name)
             model = PageModel(body, self._version + 1, centre)
             if self.loop is None:
-                self._open(model, path, body.meta.get("runtime", {}).get("max_force"))
+                self._open(model, path, body.meta.get("runtime", {}))
             else:
                 self.loop.swap(path)
                 self._do(self._replace(model))
@@ -260,9 +260,10 @@ class PartPage(LocalServer):
         """Say that no more solves come, and why; what is there can be touched on."""
         self._turn("ended", words)
 
-    def _open(self, model: PageModel, path: str | os.PathLike[str], limit: float | None) -> None:
-        """Start the real-time process with a force limit in N, the device's by default, and a session for its pages."""
-        loop = LoopProcess(path, device=self._device, max_force=limit)
+    def _open(self, model: PageModel, path: str | os.PathLike[str], limits: Mapping[str, Any]) -> None:
+        """Start the real-time process with a study's limits, the device's by default, and a session for its pages."""
+        own = {name: limits.get(name) for name in ("max_force", "max_torque")}
+        loop = LoopProcess(path, device=self._device, **own)
         self.loop = self._closing.enter_context(loop)
         hand = hand_kind(self._device)
         self._session = Session(model, self.loop, hand, self._device, recordings=self._recordings)

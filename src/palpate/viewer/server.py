@@ -108,6 +108,7 @@ class ViewerOptions(ServerOptions, total=False):
     device: str
     rate: float
     max_force: float | None
+    max_torque: float | None
     unsoftened: bool
     controller: bool
     dead_man: bool
@@ -131,6 +132,8 @@ class Viewer(LocalServer):
         Of the real-time process, Hz.
     max_force : float, optional
         Force limit, N; the device's own by default.
+    max_torque : float, optional
+        Limit in N m of the torque on a device that renders one; the device's own by default.
     strict_port : bool
         Whether a busy port is an error; otherwise the next free one is taken.
     token : bool
@@ -172,6 +175,7 @@ class Viewer(LocalServer):
         device: str = "page",
         rate: float = 1000.0,
         max_force: float | None = None,
+        max_torque: float | None = None,
         unsoftened: bool = False,
         controller: bool = True,
         dead_man: bool = False,
@@ -191,6 +195,7 @@ class Viewer(LocalServer):
             device=device,
             rate=rate,
             max_force=max_force,
+            max_torque=max_torque,
             replay=replay,
             unsoftened=unsoftened,
             controller=controller,

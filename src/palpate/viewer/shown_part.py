@@ -242,7 +242,10 @@ def _size_problems(wish: StartWish, room: np.ndarray) -> dict[str, str]:
             problems[f"size-{key}"] = error_line(error)
     if problems:
         return problems
-    first, last = next(iter(wish.sizes)), [key for key in wish.sizes if key not in TURNS][-1]
+    first, last = (
+        next(iter(wish.sizes), ""),
+        next((key for key in reversed(wish.sizes) if key not in TURNS), ""),
+    )
     try:
         tool = wished_tool(wish)
     except UsageError as error:  # of sizes that do not go together the last is the one that ends the shape
@@ -289,15 +292,13 @@ def require_round_edge(tool: PosedTool) -> None:
 def _tools(choices: PartChoices) -> tuple[ToolInfo, ...]:
     """Return what can press a part, with sizes that suit it, or those that were chosen."""
     tools = [ToolInfo(BALL, "", ())]
-    shapes = {name: (about(name), suitable_tool(name, choices.radius)) for name in USUAL}
-    if choices.posed is not None:  # one from a file is there only where the study has it
-        shapes[choices.tool] = (shapes.get(choices.tool, ("the study's own",))[0], choices.posed)
-    for name, (words, tool) in shapes.items():
+    for name in dict.fromkeys((*USUAL, choices.tool)) if choices.tool != BALL else USUAL:
+        own = choices.posed if name == choices.tool else None
+        texts = _size_texts(own or suitable_tool(name, choices.radius))
         sizes = tuple(
-            SizeInfo(key, _title(key).removeprefix("The ").lower(), text)
-            for key, text in _size_texts(tool).items()
+            SizeInfo(key, _title(key).removeprefix("The ").lower(), text) for key, text in texts.items()
         )
-        tools.append(ToolInfo(name, words, sizes))
+        tools.append(ToolInfo(name, about(name), sizes))
     return tuple(tools)
 
 

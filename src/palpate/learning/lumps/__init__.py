@@ -1,4 +1,4 @@
-"""What lumps add to a pressed body, learnt from what its presses without a lump tell of them.
+"""The energy that lumps add to a pressed body, learnt from its presses without a lump.
 
 ::
 

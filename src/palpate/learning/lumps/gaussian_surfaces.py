@@ -6,16 +6,13 @@ by coordinate search: each is made wider and narrower in turn, and kept where ro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.network import Network
-from palpate.network.network import Scaling
-from palpate.units import Quantity, Range
+from palpate.surrogates.lumps.gaussian_sum import GaussianSum
 
-__all__ = ["Samples", "Surface", "as_network", "fit_surface", "fit_widths", "spread_rows"]
+__all__ = ["Samples", "Surface", "as_sum", "fit_surface", "fit_widths", "spread_rows"]
 
 RIDGE = 1e-8  # on squared weights, over the mean square of a column
 PART = 4000  # rows whose regressors are held at once
@@ -27,30 +24,15 @@ SEARCHED = 260, 1500  # units and rows, at most, in the search of widths
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Values and slopes of one function, scaled.
+    """Values and slopes of one function, scaled."""
 
-    Attributes
-    ----------
-    Z : (N, n)
-        Inputs, scaled to [−1, 1] over their ranges.
-    value : (N,)
-        Of the function.
-    weight : (N,)
-        How much each row counts.
-    slopes : (N, q), optional
-        Derivatives along q directions, scaled as the inputs.
-    directions : (n, q), optional
-        These directions.
-    reach : (N,), optional
-        Weight of a row's slopes beside its value: the scaled length over which a difference of slope makes a
-        difference of value that counts as much.
-    """
-
-    Z: np.ndarray
-    value: np.ndarray
-    weight: np.ndarray
-    slopes: np.ndarray | None = None
-    directions: np.ndarray | None = None
+    Z: np.ndarray  # (N, n) inputs, scaled to [−1, 1] over their ranges
+    value: np.ndarray  # (N,) of the function
+    weight: np.ndarray  # (N,) of each row in the fit
+    slopes: np.ndarray | None = None  # (N, q) derivatives along q directions, scaled as the inputs
+    directions: np.ndarray | None = None  # (n, q)
+    # (N,) weight of a row's slopes beside its value: the scaled length over which a difference of slope makes a
+    # difference of value that counts as much
     reach: np.ndarray | None = None
 
     def take(self, rows: np.ndarray) -> Samples:
@@ -139,17 +121,11 @@ def fit_surface(rows: Samples, widths: np.ndarray, units: int) -> Surface:
     return Surface(centres, widths, np.zeros(0)).fit(rows)
 
 
-def as_network(surface: Surface, inputs: Sequence[Range], output: Quantity, scaling: Scaling) -> Network:
-    """Return the surface as a network of physical inputs; `scaling` is that of its rows."""
+def as_sum(surface: Surface, middle: np.ndarray, half: np.ndarray) -> GaussianSum:
+    """Return the surface as a function of physical inputs, whose ranges have these middles and halves (n,)."""
     n = surface.centres.shape[1]
-    return Network.axis_aligned(
-        inputs,
-        [output],
-        centres=surface.centres,
-        widths=np.broadcast_to(surface.widths, surface.centres.shape),
-        weights=surface.weights[None, 1 + n :],
-        tail=surface.weights[None, : 1 + n],
-        scaling=scaling,
+    return GaussianSum(
+        middle, half, surface.centres, surface.widths, surface.weights[1 + n :], surface.weights[: 1 + n]
     )
 
 

@@ -18,15 +18,14 @@ from threadpoolctl import threadpool_limits
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.dataset_symmetry import declared_symmetry
-from palpate.learning.lumps.gaussian_surfaces import Samples, as_network, fit_surface, fit_widths
-from palpate.network.network import Scaling
+from palpate.learning.lumps.gaussian_surfaces import Samples, as_sum, fit_surface, fit_widths
 from palpate.surrogates.lumps.lump_contrast import LumpContrast, closed_form, contrast_inputs
 from palpate.surrogates.lumps.lump_room import LumpRoom, skin_of
-from palpate.units import Quantity, Range
+from palpate.units import Range
 
 __all__ = ["LEAST_CONTRAST", "LumpPresses", "change_errors", "learn_lumps"]
 
-LEAST_CONTRAST = 0.01  # of the force: a change below it is felt by nobody, and is not judged
+LEAST_CONTRAST = 0.01  # of the force: a change below it is felt by nobody, and has no error
 FELT = 0.003  # ΔU/U at which a lookup counts half
 IMAGES = 4  # of each lookup by the body's symmetry, at most
 UNITS, FEWER_UNITS = 640, 120  # of ln(D/U), and of ln β
@@ -111,7 +110,7 @@ class LumpPresses:
         return np.unique(np.round(self.X[:, :2] / unit), axis=0, return_inverse=True)[1].ravel()
 
     @property
-    def judged(self) -> np.ndarray:
+    def contrast_rows(self) -> np.ndarray:
         """Rows of presses solved with a lump whose change of force counts."""
         size = np.linalg.norm(self.force, axis=1)
         with np.errstate(invalid="ignore"):
@@ -163,10 +162,10 @@ def learn_lumps(
 
 @dataclass(frozen=True, eq=False)
 class _Shape:
-    """What is chosen once, before presses are left out: scaling, distance exponent and widths."""
+    """The choices of a fit, made once before presses are left out: scaling, distance exponent and widths."""
 
-    inputs: tuple[Range, ...]
-    scaling: Scaling
+    middle: np.ndarray
+    half: np.ndarray
     decay: float
     widths: np.ndarray
     soft_widths: np.ndarray
@@ -175,13 +174,7 @@ class _Shape:
     def of(cls, presses: LumpPresses) -> _Shape:
         Z, _, _ = _rows(presses)
         low, high = Z.min(axis=0), Z.max(axis=0)
-        names = ("c_x", "c_y", "c_z", "o_x", "o_y", "o_z", "ln r")
-        inputs = tuple(
-            Range(name, float(a), float(b), "" if name == "ln r" else "m")
-            for name, a, b in zip(names, low, high, strict=True)
-        )
-        scaling = Scaling.of(inputs, np.zeros((1, 1)), scale=1.0)
-        first = cls(inputs, scaling, 0.0, WIDTHS, WIDTHS)
+        first = cls((low + high) / 2.0, (high - low) / 2.0, 0.0, WIDTHS, WIDTHS)
         rows, groups = first.density_rows(presses)
         far = np.log(np.linalg.norm(Z[:, 3:6], axis=1))
         B = np.column_stack([np.ones(len(far)), rows.Z, far]) * np.sqrt(rows.weight)[:, None]
@@ -208,13 +201,13 @@ class _Shape:
         share = D / U
         weight = (share / (share + FELT)) ** 2
         # along a coordinate of the hand at a fixed lump: half ranges turn slopes into those by scaled inputs
-        half = self.scaling.input_half
+        half = self.half
         directions = np.vstack(
             [np.diag(half[:3].mean() / half[:3]), np.diag(-half[:3].mean() / half[3:6]), np.zeros((1, 3))]
         )
         reach = U / np.linalg.norm(presses.force[i], axis=1) / half[:3].mean()
         rows = Samples(
-            self.scaling.scale_inputs(Z), value, weight, slope * half[:3].mean(), directions, reach
+            (Z - self.middle) / self.half, value, weight, slope * half[:3].mean(), directions, reach
         )
         return rows, presses.groups[i]
 
@@ -225,7 +218,9 @@ class _Shape:
         i, j = index[few].T
         share = presses.density[i, j] / presses.energy[i]
         rows = Samples(
-            self.scaling.scale_inputs(Z[few]), np.log(presses.compliance[i, j]), (share / (share + FELT)) ** 2
+            (Z[few] - self.middle) / self.half,
+            np.log(presses.compliance[i, j]),
+            (share / (share + FELT)) ** 2,
         )
         return rows, presses.groups[i]
 
@@ -233,10 +228,7 @@ class _Shape:
         """Return the contrast learnt from presses, with a given k."""
         dense = fit_surface(self.density_rows(presses)[0], self.widths, units)
         soft = fit_surface(self.compliance_rows(presses)[0], self.soft_widths, min(units, FEWER_UNITS))
-        density, compliance = (
-            as_network(surface, self.inputs, Quantity(name), self.scaling)
-            for surface, name in ((dense, "ln(D/U), its closed form apart"), (soft, "ln beta"))
-        )
+        density, compliance = (as_sum(surface, self.middle, self.half) for surface in (dense, soft))
         return LumpContrast(density, compliance, self.decay, k, presses.room)
 
 
@@ -256,25 +248,26 @@ def _rows(presses: LumpPresses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _curvature(presses: LumpPresses) -> float:
     """Return the constant k that fits the presses solved with a lump best; 0 where there are few."""
-    rows = np.flatnonzero(np.isfinite(presses.added))
+    rows = np.flatnonzero(np.isfinite(presses.added) & (presses.ratio != 1.0))
     if len(rows) < FEWEST:
         return 0.0
     x, beta = presses.ratio[rows] - 1.0, presses.compliance[rows, 0]
     s = beta * x / (1.0 + beta * x)
-    missed = np.log(presses.added[rows] * (1.0 + beta * x) / (x * presses.density[rows, 0]))
-    return float((s**2 @ missed) / (s**2 @ s**2))
+    beside = presses.added[rows] * (1.0 + beta * x) / (x * presses.density[rows, 0])
+    weight = np.where(beside > 0, s**2, 0.0)  # a change below the solves' own error may have either sign
+    return float((weight @ np.log(np.where(beside > 0, beside, 1.0))) / max(weight @ weight, 1e-300))
 
 
 def _left_out_errors(presses: LumpPresses, shape: _Shape, k: float, units: int) -> np.ndarray:
-    """Return the contrast error (M,) of the judged presses, each learnt without the presses at its place."""
-    judged, groups = presses.judged, presses.groups
-    if len(judged) < FEWEST:
+    """Return the contrast error (M,) of presses in `contrast_rows`, each learnt without the presses at its place."""
+    contrast_rows, groups = presses.contrast_rows, presses.groups
+    if len(contrast_rows) < FEWEST:
         return np.empty(0)
     names = np.random.default_rng(0).permutation(np.unique(groups))
     errors = []
     for fold in range(FOLDS):
         out = np.isin(groups, names[fold::FOLDS])
-        asked = judged[out[judged]]
+        asked = contrast_rows[out[contrast_rows]]
         if not len(asked):
             continue
         contrast = shape.fit(presses.take(np.flatnonzero(~out)), k, units)

@@ -128,7 +128,7 @@ class Lumped(MadeFrom):
 
     @property
     def scales(self) -> Mapping[str, float]:
-        """What a small step of each number is measured by, where not by the number: lengths by the radius, in m."""
+        """Lengths, m, that measure a small step of a number, where not the number itself: the radius for a place."""
         return dict.fromkeys("xyz", self.radius)
 
     @property

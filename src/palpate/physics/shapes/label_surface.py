@@ -38,22 +38,12 @@ CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-
 
 @dataclass(frozen=True, eq=False)
 class LabelSurface:
-    """The surfaces between labels.
+    """The surfaces between labels, whose numbers are 0 for no body and k for the k-th name of the image."""
 
-    Attributes
-    ----------
-    points : (n, 3) array
-        Corners of the triangles, m.
-    triangles : (t, 3) int array
-        Counter-clockwise as seen from the side of `outside`.
-    inside, outside : (t,) int arrays
-        Number of the label on either side: 0 is no body, k the k-th name of the image.
-    """
-
-    points: np.ndarray
-    triangles: np.ndarray
-    inside: np.ndarray
-    outside: np.ndarray
+    points: np.ndarray  # (n, 3) corners of the triangles, m
+    triangles: np.ndarray  # (t, 3), counter-clockwise as seen from the side of `outside`
+    inside: np.ndarray  # (t,) number of the label on the one side
+    outside: np.ndarray  # (t,) number of the label on the other
 
     @property
     def area_vectors(self) -> np.ndarray:

@@ -190,7 +190,7 @@ def _mesh_scan(
 ) -> tuple[BodyMesh, tuple[str, ...]]:
     """Return the mesh of a labelmap and notes about it: a function for the child process in which Netgen runs."""
     image = clear_specks(name_labels(path, read_scan(path), labels))
-    size = image.labels.shape * image.spacing
+    size = np.array(image.labels.shape) * image.spacing
     require_size(path, float(size.max()), "mm")
     turned = turn_upwards(image, up)
     volume = sum(image.volumes.values())
@@ -200,7 +200,7 @@ def _mesh_scan(
     points, tetrahedra, region = _fill(path, surface, spacing)
     # the numbers of regions that the mesh has are those of the labels, from 1
     mesh = _body(turned, surface, points, tetrahedra, region, spacing)
-    return mesh, (*image.notes, *_told(path, image, surface, mesh, spacing))
+    return mesh, (*image.notes, *_notes(path, image, surface, mesh, spacing))
 
 
 def turn_upwards(image: LabelImage, up: str) -> LabelImage:
@@ -288,7 +288,7 @@ def _on_cut(image: LabelImage, corners: np.ndarray, spacing: float) -> np.ndarra
     return np.asarray((first | last).any(axis=1))
 
 
-def _told(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, spacing: float) -> list[str]:
+def _notes(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, spacing: float) -> list[str]:
     """Return sentences about what became of each tissue; refuse a mesh that has lost one."""
     told = []
     if CUT_FACE in mesh.surfaces:

@@ -38,30 +38,14 @@ SEGMENT = re.compile(r"Segment(\d+)_(Name|LabelValue)$")
 
 @dataclass(frozen=True, eq=False)
 class LabelImage:
-    """Labels of voxels, and where they lie: left, posterior and superior of the patient are x, y and z.
+    """Labels of voxels, and where they lie: left, posterior and superior of the patient are x, y and z."""
 
-    Attributes
-    ----------
-    labels : (i, j, k) int array
-        Number of the tissue of each voxel; 0 is no body.
-    spacing : (3,) array
-        Size of a voxel along i, j and k, m.
-    axes : (3, 3) array
-        Unit directions of i, j and k in its columns.
-    origin : (3,) array
-        Centre of the first voxel, m.
-    names : dict of str to int
-        Names of the labels that belong to the body.
-    notes : tuple of str
-        A sentence about each thing that was passed over, removed or decided.
-    """
-
-    labels: np.ndarray
-    spacing: np.ndarray
-    axes: np.ndarray
-    origin: np.ndarray
-    names: dict[str, int]
-    notes: tuple[str, ...] = ()
+    labels: np.ndarray  # (i, j, k) number of the tissue of each voxel; 0 is no body
+    spacing: np.ndarray  # (3,) size of a voxel along i, j and k, m
+    axes: np.ndarray  # (3, 3) unit directions of i, j and k in its columns
+    origin: np.ndarray  # (3,) centre of the first voxel, m
+    names: dict[str, int]  # of the labels that belong to the body
+    notes: tuple[str, ...] = ()  # a sentence about each thing that was passed over, removed or decided
 
     def with_notes(self, *notes: str) -> LabelImage:
         """Return the same image with further notes."""

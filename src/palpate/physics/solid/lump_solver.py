@@ -37,61 +37,30 @@ STEPS = (
 
 @dataclass(frozen=True)
 class LumpSolution(SolidSolution):
-    """A press without a lump, and what it tells of L lumps.
+    """A press without a lump, and what it says of L lumps; a solve with the first one stands beside it, NaN without."""
 
-    Attributes
-    ----------
-    lump_place, lump_radius : (L, 3), (L,) arrays
-        Of the lumps that were looked up, m.
-    lump_energy, lump_slope : (L,), (L, 3) arrays
-        D in J, and its slopes by the place of the probe in N.
-    lump_compliance : (K,) array
-        β of the first K of them.
-    lump_ratio, lump_added : float
-        Ratio of the first lump in the solve with it, and the energy in J that it adds; NaN without such a solve.
-    lump_force : (3,) array
-        The force in N that it adds.
-    lump_message : str
-        Why there is no solve with it, where one was wanted; "" otherwise.
-    """
-
-    lump_place: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
-    lump_radius: np.ndarray = field(default_factory=lambda: np.empty(0))
-    lump_energy: np.ndarray = field(default_factory=lambda: np.empty(0))
-    lump_slope: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
-    lump_compliance: np.ndarray = field(default_factory=lambda: np.empty(0))
-    lump_ratio: float = np.nan
-    lump_added: float = np.nan
-    lump_force: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
-    lump_message: str = ""
+    lump_place: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))  # (L, 3), m
+    lump_radius: np.ndarray = field(default_factory=lambda: np.empty(0))  # (L,), m
+    lump_energy: np.ndarray = field(default_factory=lambda: np.empty(0))  # (L,) D in J
+    lump_slope: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))  # (L, 3) of D by the probe, N
+    lump_compliance: np.ndarray = field(default_factory=lambda: np.empty(0))  # (K,) β of the first K lumps
+    lump_ratio: float = np.nan  # of the first lump, in the solve with it
+    lump_added: float = np.nan  # energy that it adds, J
+    lump_force: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))  # (3,) force that it adds, N
+    lump_message: str = ""  # why there is no solve with it, where one was wanted
 
 
 @dataclass(frozen=True)
 class LumpedPress:
-    """A press solved with a lump.
+    """A press solved with a lump."""
 
-    Attributes
-    ----------
-    stop : Stop
-        Why the iteration ended.
-    message : str
-        That in words.
-    added : float
-        Energy in J beyond that of the same press without a lump.
-    force : (3,) array
-        Force in N beyond that.
-    slopes : (5,) array
-        ∂added/∂(x, y, z, radius, ratio) of the lump, in N, N, N, N and J.
-    state : (dof,) array
-        The unknowns.
-    """
-
-    stop: Stop
-    message: str
-    added: float = np.nan
-    force: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
+    stop: Stop  # why the iteration ended
+    message: str  # the same in words
+    added: float = np.nan  # energy beyond that of the same press without a lump, J
+    force: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))  # (3,) force beyond it, N
+    # (5,) ∂added/∂(x, y, z, radius, ratio) of the lump, in N, N, N, N and J
     slopes: np.ndarray = field(default_factory=lambda: np.full(5, np.nan))
-    state: np.ndarray = field(default_factory=lambda: np.empty(0))
+    state: np.ndarray = field(default_factory=lambda: np.empty(0))  # (dof,) the unknowns
 
 
 class LumpSolver:

@@ -1,4 +1,4 @@
-"""How quickly a body may be pressed: its lowest natural frequency, for answers that are static equilibria.
+"""The lowest natural frequency of a body: it limits how quickly a body with static answers may be pressed.
 
 The frequency f₀ is that of small vibrations about rest, K v = (2π f₀)² M v, by Lanczos' method on K⁻¹ M. A body that is
 driven at a frequency f answers, in its lowest mode, by 1/(1 − (f/f₀)²) of what it does at rest (see

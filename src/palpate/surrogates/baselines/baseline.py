@@ -134,6 +134,10 @@ class Baseline(ABC):
         """Return the same baseline on another touched surface; itself where it has none."""
         return self
 
+    def surface_shift(self, normal: np.ndarray) -> np.ndarray:
+        """Return the way (3,), m, by which `surface` lies before the body's own of a normal (3,); zero by default."""
+        return np.zeros(3)
+
     @property
     def radius(self) -> float:
         """Radius of the probe, m; not-a-number where there is none, or an input is it."""

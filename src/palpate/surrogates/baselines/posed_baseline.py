@@ -88,6 +88,10 @@ class PosedBaseline(ToolBaseline):
         """Depth in m of a ball of the tool's size at which its own balls are as deep as the distance goes."""
         return float(self.touched.inner - (self.probe_radius - self.balls[0, 3]))
 
+    def surface_shift(self, normal: np.ndarray) -> np.ndarray:
+        """Return zero (3,): the surface is the body's own."""
+        return np.zeros(3)
+
     def fault(self, inputs: tuple[Range, ...]) -> str:
         """Return what does not fit the network's inputs; "" if all does."""
         wanted = 3 + len(self.posed_tool.angles)

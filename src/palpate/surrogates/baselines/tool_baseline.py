@@ -77,6 +77,10 @@ class ToolBaseline(ContactBaseline):
         """The tool in its orientation."""
         return PosedTool.of(json.loads(self.tool))
 
+    def surface_shift(self, normal: np.ndarray) -> np.ndarray:
+        """Return the way (3,) in m from the tool's place to the ball that touches a plane of this normal (3,)."""
+        return deepest_ball(self.posed_tool, normal)[1]
+
     @property
     def probe_words(self) -> str:
         """The tool in a few words."""

@@ -119,7 +119,7 @@ def coefficients_into(c, p, z, place, b, lines, small, numbers, limits, surface,
 
 
 @kernel
-def posed_coefficients_into(c, p, s, foot, normal, z, place, b, lines, numbers, limits, net) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def posed_coefficients_into(c, p, s, contact_point, normal, z, place, b, lines, numbers, limits, net) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Coefficients and frame as above, of a touch whose depth s (m), place (3,) in m and normal (3,) are known."""
     if not _begun(c, p, z, place, lines):
         return False
@@ -127,7 +127,7 @@ def posed_coefficients_into(c, p, s, foot, normal, z, place, b, lines, numbers, 
     if s <= 0.0:
         return False
     for i in range(3):
-        place[2 + i] = foot[i]
+        place[2 + i] = contact_point[i]
         place[5 + i] = normal[i]
     _coefficients(z, place, b, lines, numbers, limits, net)
     return True

@@ -85,13 +85,7 @@ def modulus_factor(share: Any, ratio: Any) -> Any:
 
 
 def require_apart(lumps: tuple[Lump, ...]) -> None:
-    """Refuse lumps whose edges meet: what they add to a press is then no sum.
-
-    Raises
-    ------
-    UsageError
-        If two are nearer to each other than their radii with their edges.
-    """
+    """Refuse lumps whose edges meet: what they add to a press is then no sum."""
     for i, one in enumerate(lumps):
         for other in lumps[:i]:
             gap = math.dist(one.place, other.place) - EDGE * (one.radius + other.radius)

@@ -27,25 +27,25 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.format import share
-from palpate.network import Network
+from palpate.surrogates.lumps.gaussian_sum import GaussianSum
 from palpate.surrogates.lumps.lump import Lump, require_apart
 from palpate.surrogates.lumps.lump_room import LumpRoom
 
 if TYPE_CHECKING:
     from palpate.surrogates.energy import LearntEnergy
 
-__all__ = ["LumpContrast", "closed_form", "contrast_inputs", "value_and_slopes"]
+__all__ = ["LumpContrast", "closed_form", "contrast_inputs"]
 
 
 @dataclass(frozen=True, eq=False)
 class LumpContrast:
-    """What any lump adds to a body's energy, as a value that its file keeps.
+    """The energy that any lump adds to a body's, as a value that its file keeps.
 
     Attributes
     ----------
-    density : Network
+    density : GaussianSum
         N of ln(D/U): seven inputs, the hand's place (m), the lump's offset from it (m) and ln(radius/m).
-    compliance : Network
+    compliance : GaussianSum
         Of ln β, of the same inputs.
     decay : float
         Exponent e of the distance between hand and lump.
@@ -60,23 +60,22 @@ class LumpContrast:
     Raises
     ------
     UsageError
-        If the networks have other than seven inputs or more than one output.
+        If they have other than seven inputs.
     """
 
-    density: Network
-    compliance: Network
+    density: GaussianSum
+    compliance: GaussianSum
     decay: float
     curvature: float
     room: LumpRoom
     meta: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for network in (self.density, self.compliance):
-            if len(network.inputs) != 7 or len(network.outputs) != 1 or network.radial != "gaussian":
+        for part in (self.density, self.compliance):
+            if part.middle.size != 7:
                 raise UsageError(
-                    f"{network} is none of the energy of a lump.",
-                    why="That takes seven inputs (place of the hand, offset of the lump, ln radius), one output and "
-                    "Gaussian units.",
+                    f"A function of {part.middle.size} inputs is none of the energy of a lump.",
+                    why="That takes seven: place of the hand, offset of the lump from it, ln radius.",
                     fix="Let `palpate.learn` make it of a sweep of `palpate.LumpProblem`.",
                 )
 
@@ -98,8 +97,8 @@ class LumpContrast:
 
     def looked_up_at(self, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return the same of inputs Z (N, 7), each of its own lump (see `contrast_inputs`)."""
-        value, slopes = value_and_slopes(self.density, Z)
-        softness, bends = value_and_slopes(self.compliance, Z)
+        value, slopes = self.density.value_and_slopes(Z)
+        softness, bends = self.compliance.value_and_slopes(Z)
         offset, squared = Z[:, 3:6], (Z[:, 3:6] ** 2).sum(axis=1)
         value = value + 3.0 * Z[:, 6] - 0.5 * self.decay * np.log(squared)
         # the offset is the lump's place less the hand's
@@ -163,24 +162,5 @@ def closed_form(
 
 
 def contrast_inputs(X: np.ndarray, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return the inputs (N, 7) of the networks: the hand's places X (N, 3), the lumps' offsets from it, ln radius."""
+    """Return the inputs (N, 7) of both sums: the hand's places X (N, 3), the lumps' offsets from it, ln radius."""
     return np.column_stack([X, places - X, np.log(radii)])
-
-
-def value_and_slopes(network: Network, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the one output (N,) of a network of Gaussians and its slopes (N, n), at physical inputs Z (N, n)."""
-    scaling = network.scaling
-    xi = scaling.scale_inputs(Z)
-    value = network.tail[0, 0] + xi @ network.tail[0, 1:]
-    slopes = np.tile(network.tail[0, 1:], (len(Z), 1))
-    if network.units:
-        # all units have one shape, as learning makes them: ‖A ξ − b‖² is a product of two tables
-        A, b = network.factors[0], network.shifts
-        far = xi @ A.T
-        q = (far**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2.0 * far @ b.T
-        phi = np.exp(-np.maximum(q, 0.0)) * network.weights[0]
-        total = phi.sum(axis=1)
-        value = value + total
-        slopes -= 2.0 * (total[:, None] * far - phi @ b) @ A
-    size = scaling.output_scale[0]
-    return scaling.output_centre[0] + size * value, size * slopes / scaling.input_half

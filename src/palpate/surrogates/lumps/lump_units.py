@@ -39,10 +39,8 @@ RATIO = 0.02  # share of the largest f below which a place is not about a lump
 def energy_with_lumps(energy: LearntEnergy, contrast: LumpContrast, lumps: Sequence[Lump]) -> LearntEnergy:
     """Return the energy of the body with lumps; without any, and at ratio 1, the energy as it is.
 
-    Raises
-    ------
-    UsageError
-        If a lump leaves its room or the skin, two meet, or the body has inputs beside the place of a probe.
+    A lump that leaves its room or the skin, lumps that meet, and a body with inputs beside the place of a probe are
+    UsageErrors.
     """
     if len(energy.inputs) != 3 or energy.baseline.holds:
         raise UsageError(

@@ -57,13 +57,7 @@ _UNDER = ("", "relaxation", "indentation")  # by their numbers in an export
 
 
 def require_coefficients(static: float, kinetic: float) -> None:
-    """Refuse coefficients of friction that no pair of surfaces has.
-
-    Raises
-    ------
-    UsageError
-        For one that is negative or no number, or a kinetic one above the static one.
-    """
+    """Refuse coefficients of friction that no pair of surfaces has: negative or no numbers, or kinetic above static."""
     for what, value in (("static", static), ("kinetic", kinetic)):
         if not (math.isfinite(value) and value >= 0):
             raise UsageError(
@@ -269,8 +263,12 @@ class Friction(Memory):
             μ_k.
         static : float, optional
             μ_s; the kinetic one by default.
-        exponent, ratio, under
-            As the attributes; by default a ball on an incompressible body that forgets.
+        exponent : float
+            Exponent of the normal force over depth; 3/2 by default, of a ball.
+        ratio : float
+            Tangential over normal stiffness of the contact; by default that of an incompressible body.
+        under : Memory, optional
+            Memory of the body itself; none by default.
 
         Raises
         ------
@@ -291,8 +289,13 @@ class Friction(Memory):
 
     @property
     def of_body(self) -> Memory | None:
-        """What the body itself remembers, without friction."""
+        """The memory of the body itself, without friction."""
         return self.under
+
+    @property
+    def friction(self) -> Friction:
+        """The memory itself, which is that of a tool's friction."""
+        return self
 
     def start(self) -> FrictionState:
         """Return the state of a body that nothing touches."""

@@ -12,13 +12,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
 from palpate.errors import UsageError
 from palpate.network.kinds import register_kind
 from palpate.surrogates.memories.patches import Patches
+
+if TYPE_CHECKING:
+    from palpate.surrogates.memories.friction import Friction
 
 __all__ = ["Amplitude", "Carry", "Memory", "MemoryState", "amplitudes", "register_memory"]
 
@@ -144,8 +147,13 @@ class Memory(ABC):
 
     @property
     def of_body(self) -> Memory | None:
-        """What the body itself remembers: this memory, unless it is of a tool's friction on the body."""
+        """The memory of the body itself: this one, unless it is of a tool's friction on the body."""
         return self
+
+    @property
+    def friction(self) -> Friction | None:
+        """The friction of a tool on the body; None without."""
+        return None
 
     def carry_from(self, other: Memory) -> Carry:
         """Return how a state of this memory takes over what a state of `other` remembers, as amplitudes in √J.

@@ -40,12 +40,12 @@ def contrast_error(subject: Subject) -> ContrastError | str | None:
     if lumps is None or data is None or "lump_energy" not in data:
         return None
     presses = LumpPresses.of(data)
-    judged = presses.judged
-    if len(judged) < FEWEST:
+    contrast_rows = presses.contrast_rows
+    if len(contrast_rows) < FEWEST:
         return (
             f"The contrast of lumps is not judged: it takes {FEWEST} unseen presses whose lump changes the force by "
-            f"1 % or more, and there are {len(judged)}."
+            f"1 % or more, and there are {len(contrast_rows)}."
         )
-    errors = change_errors(lumps, presses.take(judged))
+    errors = change_errors(lumps, presses.take(contrast_rows))
     median, p95 = np.quantile(errors, [0.5, 0.95])
-    return ContrastError(len(judged), float(median), float(p95))
+    return ContrastError(len(contrast_rows), float(median), float(p95))

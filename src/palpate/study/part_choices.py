@@ -31,7 +31,7 @@ from palpate.study.tool_kind import ToolRecord
 if TYPE_CHECKING:
     from palpate.viewer.shown_part import PartChoices, ShownMaterial, ShownPart
 
-__all__ = ["LAWS", "chosen_study", "judge_region", "shown_part"]
+__all__ = ["LAWS", "chosen_study", "shown_part"]
 
 LAWS = ("neo-hookean", "st-venant-kirchhoff", "linear-elastic")
 """Laws that take Young's modulus and Poisson's ratio alone."""

@@ -47,25 +47,17 @@ def deck(
     width, height, ball = size[0] / 2 / MILLI, size[1] / MILLI, radius / MILLI
     across = graded(width, REACH * ball, fine / MILLI)
     down = graded(height, REACH * ball, fine / MILLI)
-    lines = [*_block(across, down), *_cap(ball)]
-    lines += ["*MATERIAL, NAME=LAW", law, "*SOLID SECTION, ELSET=BODY, MATERIAL=LAW"]
-    lines += ["*MATERIAL, NAME=HARD", "*ELASTIC", "1e6, 0.3", "*SOLID SECTION, ELSET=BALL, MATERIAL=HARD"]
-    stiff = PENALTY * young / KILO / ball  # kPa/mm
-    lines += [
-        "*SURFACE INTERACTION, NAME=TOUCH",
-        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
-        f"{stiff!r}",
-    ]
-    lines += ["*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE", "TOP, CAP"]
-    lines += ["*BOUNDARY", "BOTTOM, 1, 3", "XSIDE, 1, 1", "YSIDE, 2, 2", "CAPNODES, 1, 2"]
+    lines = [*block(across, across, down), *_cap(ball)]
+    lines += contact(law, PENALTY * young / KILO / ball)
+    lines += ["*BOUNDARY", "BOTTOM, 1, 3", "XSIDE, 1, 1", "YSIDE, 2, 2", "TOOLNODES, 1, 2"]
     for depth in depths:
         lines += [
             "*STEP, NLGEOM, INC=200",
             "*STATIC",
             "0.5, 1., 1e-3, 0.5",
             "*BOUNDARY",
-            f"CAPNODES, 3, 3, {-depth / MILLI!r}",
-            "*NODE PRINT, NSET=CAPNODES, TOTALS=ONLY, FREQUENCY=1000",
+            f"TOOLNODES, 3, 3, {-depth / MILLI!r}",
+            "*NODE PRINT, NSET=TOOLNODES, TOTALS=ONLY, FREQUENCY=1000",
             "RF",
             "*END STEP",
         ]
@@ -79,18 +71,30 @@ def forces(text: str) -> np.ndarray:
     return -4 * MILLI * np.array([float(row.split()[-1]) for row in totals])
 
 
-def _block(across: np.ndarray, down: np.ndarray) -> list[str]:
-    """Nodes, elements and sets; the ball's axis is x = y = 0 and the top z = 0."""
-    x, z = (np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2])).tolist() for ends in (across, down))
+def contact(law: str, stiff: float) -> list[str]:
+    """Materials of body and tool, and frictionless contact between them under a penalty in kPa/mm."""
+    return [
+        *("*MATERIAL, NAME=LAW", law, "*SOLID SECTION, ELSET=BODY, MATERIAL=LAW"),
+        *("*MATERIAL, NAME=HARD", "*ELASTIC", "1e6, 0.3", "*SOLID SECTION, ELSET=TOOL, MATERIAL=HARD"),
+        *("*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{stiff!r}"),
+        *("*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE", "TOP, FRONT"),
+    ]
+
+
+def block(across: np.ndarray, along: np.ndarray, down: np.ndarray) -> list[str]:
+    """Nodes, elements and sets from the ends of elements along x, y and −z, all from small to large; the top is z = 0."""
+    x, y, z = (
+        np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2])).tolist() for ends in (across, along, down)
+    )
     number: dict[tuple[int, int, int], int] = {}
     elements = []
-    counts = (len(across) - 1, len(across) - 1, len(down) - 1)
+    counts = (len(across) - 1, len(along) - 1, len(down) - 1)
     for i, j, k in np.ndindex(*counts):
         # k counts downwards, so an element's lower side comes first
         own = [(2 * i + a, 2 * j + b, 2 * k + 2 - c) for a, b, c in CORNERS + MIDDLES]
         elements.append([number.setdefault(node, len(number) + 1) for node in own])
     lines = ["*NODE, NSET=ALL"]
-    lines += [f"{n}, {x[i]!r}, {x[j]!r}, {-z[k]!r}" for (i, j, k), n in number.items()]
+    lines += [f"{n}, {x[i]!r}, {y[j]!r}, {-z[k]!r}" for (i, j, k), n in number.items()]
     lines += ["*ELEMENT, TYPE=C3D20R, ELSET=BODY"]
     for n, row in enumerate(elements, 1):
         lines += [", ".join(map(str, [n, *row[:10]])) + ",", ", ".join(map(str, row[10:]))]
@@ -106,16 +110,16 @@ def _cap(ball: float) -> list[str]:
     count = math.ceil(REACH / FACET)
     slopes = np.tan(np.arange(-1, count + 1) * REACH / count)  # of lines through the centre, in two planes
     first, width = 1_000_000, len(slopes)  # numbers that the block's nodes and elements do not have
-    lines, faces = ["*NODE, NSET=CAPNODES"], []
+    lines, faces = ["*NODE, NSET=TOOLNODES"], []
     for layer, (i, j) in itertools.product((0, 1), np.ndindex(width, width)):
         ray = np.array([slopes[i], slopes[j], -1.0])
         place = (1 - THICK * layer) * ball * ray / np.linalg.norm(ray) + [0.0, 0.0, ball]
         number = first + layer * width**2 + i * width + j
         lines.append(", ".join(map(repr, [number, *place.tolist()])))
-    lines.append("*ELEMENT, TYPE=C3D8, ELSET=BALL")
+    lines.append("*ELEMENT, TYPE=C3D8, ELSET=TOOL")
     for i, j in np.ndindex(width - 1, width - 1):
         n = first + i * width + j
         square = [n, n + width, n + width + 1, n + 1]
         lines.append(", ".join(map(str, [n, *square, *(m + width**2 for m in square)])))
         faces.append(f"{n}, S1")
-    return [*lines, "*SURFACE, NAME=CAP", *faces]
+    return [*lines, "*SURFACE, NAME=FRONT", *faces]

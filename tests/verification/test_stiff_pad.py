@@ -1,15 +1,19 @@
-"""A rigid ball on the axis of a cylinder, beside an axisymmetric solve of the same cylinder that shares no code."""
+"""A rigid ball and a rigid tilted punch beside hard contact in solvers that share no code."""
 
 from __future__ import annotations
+
+import math
 
 import axisymmetric_ball
 import calculix
 import calculix_ball
+import calculix_punch
 import numpy as np
 import pytest
 
+from palpate import tools
 from palpate.errors import UsageError
-from palpate.physics.interactions import SphereProbe
+from palpate.physics.interactions import SphereProbe, SurfaceTool
 from palpate.physics.interactions.rigid_limit import rigid_pad
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block, Cylinder
@@ -44,6 +48,29 @@ def test_a_rigid_ball_feels_the_force_of_hard_contact_in_calculix(ccx, tmp_path)
     text = calculix_ball.deck(calculix.neo_hookean(gel), YOUNG, (0.10, 0.05), RADIUS, [depth], fine=0.003)
     wanted = calculix_ball.forces(calculix.output(ccx, tmp_path, text))
     np.testing.assert_allclose(found.response[2], wanted, rtol=0.02)
+
+
+@pytest.mark.full
+@pytest.mark.timeout(600)
+def test_a_tilted_punch_feels_the_force_and_torque_of_hard_contact_in_calculix(ccx, tmp_path) -> None:
+    """The torque about the middle of the face, too, where the force's arm is a seventh of the punch's radius."""
+    gel = NeoHookean(YOUNG, POISSON, form="isochoric")
+    punch = calculix_punch.Tilted(radius=0.006, edge=0.0015, angle=math.radians(4), depth=0.0015)
+    size, middle = (0.036, 0.036, 0.015), 0.018
+    tool = SurfaceTool(
+        tools.Punch(punch.radius, punch.edge),
+        rotation=(0.0, punch.angle, 0.0),
+        pad="rigid",
+        depth=(0.0, 0.002),
+        over=((0.0175, 0.0175), (0.0185, 0.0185)),
+        element=0.0015,
+    )
+    solver = Body(Block(size), gel, fixed="bottom").problem(tool).open()
+    found = solver.solve((middle, middle, size[2] - punch.depth + punch.height))
+    text = calculix_punch.deck(calculix.neo_hookean(gel), YOUNG, size, punch, fine=0.002)
+    force, torque = calculix_punch.answer(calculix.output(ccx, tmp_path, text), punch)
+    np.testing.assert_allclose(found.force, force, atol=0.02 * np.linalg.norm(force))
+    np.testing.assert_allclose(found.torque, torque, atol=0.02 * np.linalg.norm(torque))
 
 
 def test_the_pad_of_a_rigid_ball_follows_from_the_body() -> None:

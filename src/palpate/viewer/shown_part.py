@@ -20,7 +20,6 @@ from palpate.tools.tool_sizes import (
     BALL,
     TURNS,
     USUAL,
-    about,
     size_unit,
     sizes_of,
     suitable_tool,

@@ -20,6 +20,7 @@ from palpate.tools.tool_sizes import (
     BALL,
     TURNS,
     USUAL,
+    about,
     size_unit,
     sizes_of,
     suitable_tool,

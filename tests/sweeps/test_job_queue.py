@@ -10,6 +10,7 @@ from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from one_node_slurm import DAEMON_PATH, PROGRAMS, jobs, one_node_slurm
 from sweep_problems import Spring
@@ -19,7 +20,7 @@ from palpate.errors import ResourceError, UsageError
 from palpate.sweeps import JobQueue, sweep
 from palpate.sweeps.case import NoTimeLeft, failed_rows
 from palpate.sweeps.plan import make_plan
-from palpate.sweeps.runner import Machines, connect, run
+from palpate.sweeps.runner import Machines, connect, run, seconds_per_case
 from system_programs import require_program
 
 OPTIONS = {"cores": 1, "memory": "500MB", "walltime": "00:02:00"}
@@ -226,6 +227,12 @@ def test_the_end_of_many_jobs_at_once_says_nothing_of_a_chain():
     )
     assert sorted(answered) == list(range(8))
     assert len(client.ended) == 200
+
+
+def test_one_slow_case_does_not_make_all_chains_too_long():
+    rows = {"solve_seconds": np.array([1.0, 1.0, np.nan, 10.0])}
+    assert seconds_per_case(rows) == 4.0
+    assert seconds_per_case({"solve_seconds": np.full(3, np.nan)}) == 0.0
 
 
 def test_a_chain_for_which_no_fresh_job_has_time_is_said():

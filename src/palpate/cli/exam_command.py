@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -72,7 +72,7 @@ def exam(
     elif again is not None:
         _replay(_past(directory, again), console)
     else:
-        server = {"port": port, "strict_port": strict_port, "token": token}
+        server: dict[str, Any] = {"port": port, "strict_port": strict_port, "token": token}
         _open(what, directory, seed, lump or [], device, console, browser=browser, **server)
 
 

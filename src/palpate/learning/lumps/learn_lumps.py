@@ -91,12 +91,13 @@ class LumpPresses:
         lower, upper = map(np.array, record["room"])
         sizes = Range("radius", least, largest, "m"), Range("ratio", softest, hardest)
         room = LumpRoom(lower, upper, *sizes, record["cover"], skin_of(data.rest, data.triangles))
-        names = ("place", "radius", "energy", "slope", "compliance", "ratio", "added", "force")
-        lumps: Any = [np.asarray(data[f"lump_{name}"]) for name in names]
-        symmetry, about = declared_symmetry(data)
-        return cls(
-            data.X, data.potential_energy, data.response, *lumps, room=room, symmetry=symmetry, about=about
-        )
+        columns = {
+            "density": "energy", "change": "force",
+            **{name: name for name in ("place", "radius", "slope", "compliance", "ratio", "added")},
+        }  # fmt: skip
+        lumps: dict[str, Any] = {own: np.asarray(data[f"lump_{name}"]) for own, name in columns.items()}
+        lumps["symmetry"], lumps["about"] = declared_symmetry(data)
+        return cls(data.X, data.potential_energy, data.response, room=room, **lumps)
 
     def take(self, rows: np.ndarray) -> LumpPresses:
         """Return some of the presses."""

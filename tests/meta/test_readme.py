@@ -179,10 +179,16 @@ def test_the_reference_has_every_public_name():
     text = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "reference").glob("*.md"))
     import palpate
     import palpate.adapters
+    import palpate.experiments
 
     paths = re.findall(r"^::: palpate\.(\S+)", text, re.MULTILINE)
-    for package, inside in ((palpate, False), (palpate.adapters, True)):
-        listed = [path.rpartition(".")[2] for path in paths if path.startswith("adapters.") == inside]
+    inner = {"adapters": palpate.adapters, "experiments": palpate.experiments}
+    for name, package in {"": palpate, **inner}.items():
+        listed = [
+            path.rpartition(".")[2]
+            for path in paths
+            if (path.partition(".")[0] == name if name else path.partition(".")[0] not in inner)
+        ]
         assert sorted(listed) == sorted(package.__all__)
 
 

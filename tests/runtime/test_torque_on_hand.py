@@ -147,6 +147,11 @@ def test_a_limit_of_torque_below_the_devices_own_holds(body, shared):
         Limits(1.0, max_torque=-1.0)
 
 
+def test_a_torque_on_a_handle_whose_turn_nobody_knows_is_refused():
+    with pytest.raises(UsageError, match="must tell how its handle is turned"):
+        Wrist(orients=False)
+
+
 def test_a_device_without_motors_in_its_wrist_is_given_forces_alone(body, shared):
     bench = Bench(body, shared, Wrist(torque=0.0))
     bench.press()

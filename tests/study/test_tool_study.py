@@ -192,17 +192,6 @@ def under(study: Study, **changes: object) -> Study:
     return Study.model_validate(content)
 
 
-def test_the_page_shows_a_part_under_a_tool_from_a_file(part: Path):
-    ball = part.with_name("ball.stl")
-    trimesh.creation.icosphere(subdivisions=2, radius=8.0).export(ball)
-    study = under(
-        part_study(part, tool="capsule")[0], shape={"kind": "file", "file": str(ball), "unit": "mm"}
-    )
-    facts = shown_part(study).facts()
-    assert facts.choices["tool"] == "file"
-    assert "file" in [tool.name for tool in facts.tools]
-
-
 def test_what_turns_of_a_tool_stays_when_its_sizes_are_chosen(part: Path):
     study = under(part_study(part, tool="capsule")[0], turns="axis", tilt=0.2)
     wish = wish_for(shown_part(study), "capsule", radius="5 mm", length="20 mm")

@@ -18,7 +18,7 @@ import numpy as np
 from palpate.devices.device_options import settings_from
 from palpate.devices.hand_kind import HandKind
 from palpate.devices.profiles import DeviceProfile
-from palpate.errors import DeviceError
+from palpate.errors import DeviceError, UsageError
 from palpate.network.shared_memory import Block
 
 __all__ = [
@@ -99,6 +99,11 @@ class Traits:
         Largest torque that its motors render, N m; 0 for a device without, whose `write` is given forces alone.
     name : str
         What the opened device calls itself; empty takes the name of its kind.
+
+    Raises
+    ------
+    UsageError
+        For a torque on a handle whose turn nobody knows: its work could not be counted.
     """
 
     radius: float
@@ -119,6 +124,14 @@ class Traits:
     orients: bool = False
     max_torque: float = 0.0
     name: str = ""
+
+    def __post_init__(self) -> None:
+        if self.max_torque > 0.0 and not self.orients:
+            raise UsageError(
+                "A device that renders a torque must tell how its handle is turned.",
+                why="The passivity controller counts the work of the torque by the turns.",
+                fix="State orients=True and fill Sample.orientation, or leave max_torque out.",
+            )
 
     @property
     def place_noise(self) -> float:

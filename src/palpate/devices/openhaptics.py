@@ -254,7 +254,7 @@ class OpenHapticsDevice(Driver):
             max_stiffness=min(self.profile.max_stiffness, stiffness / _MM),
             continuous_force=continuous,
             orients=axes >= _ALL_AXES,
-            max_torque=_TORQUE if rendered >= _ALL_AXES else 0.0,
+            max_torque=_TORQUE if min(axes, rendered) >= _ALL_AXES else 0.0,
             reach=corner + _MARGIN if math.isfinite(corner) and corner > 0.05 else _UNSTATED_REACH,
         )
 

@@ -31,7 +31,8 @@ __all__ = ["JND", "Answers", "Estimate", "Goodness", "Psychometric"]
 
 _Axes: TypeAlias = tuple[np.ndarray, ...]
 
-JND = 0.6744897501960817  # Φ⁻¹(¾)
+JND = 0.6744897501960817
+"""Just-noticeable difference over σ: Φ⁻¹(¾)."""
 LAPSES = (0.0, 0.06)  # Wichmann & Hill 2001
 _SIDE = 1 / 6  # largest side preference, over the span of the levels
 _NARROWEST, _WIDEST = 1 / 25, 2.0  # σ over the span of the levels

@@ -92,8 +92,8 @@ class HandTurn:
     def on(
         cls, traits: Traits, upright: bool, parameters: Sequence[Range], axis: np.ndarray
     ) -> HandTurn | None:
-        """Return the turn of a hand on a device; None where that neither tells a turn nor renders a torque."""
-        if not (traits.orients or traits.max_torque > 0.0):
+        """Return the turn of a hand on a device; None where that tells no turn."""
+        if not traits.orients:
             return None
         return cls(traits.axes, upright, parameters, axis)
 

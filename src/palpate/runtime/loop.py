@@ -299,7 +299,7 @@ class Loop:
                 self.fail(Fault.IMPOSSIBLE_PLACE)
         if self.fault is Fault.NONE and not self._check.doubts:  # a doubted place: the last good one stays
             self.frame.to_hand(sample.position, self.out.hand, clutched=sample.clutched)
-            if self.turn is not None and self.device.traits.orients:
+            if self.turn is not None:
                 self._see_turn(sample.orientation)
             if self.motors and not late and not self.rest.resting:
                 self._measure_delay(self.now - sample.time)

@@ -7,10 +7,10 @@ import itertools
 
 import numpy as np
 import pytest
-from held import yielding_rod
 from touch_made import touch_energy
 
 import palpate as pp
+from held import yielding_rod
 from palpate.errors import UsageError
 from palpate.runtime.touchable import FRICTION, touchable
 from palpate.surrogates.memories import Friction, IwanElements

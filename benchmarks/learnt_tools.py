@@ -176,7 +176,7 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--case", choices=CASES, action="append")
     parser.add_argument("--folder", type=Path, help="where solves are kept")
-    parser.add_argument("--effort", type=float, default=0.2, help="of the learning")
+    parser.add_argument("--effort", type=float, default=0.1, help="of the learning")
     parser.add_argument("--record", action="store_true")
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as passing:

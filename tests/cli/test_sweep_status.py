@@ -43,6 +43,19 @@ def test_status_of_a_sweep_that_is_interrupted_and_ends(palpate, study, tmp_path
     assert "16 cases solved" in palpate("sweep", study, "--status").out
 
 
+def test_a_study_without_solves_for_testing_lacks_none(palpate, study, tmp_path):
+    text = study.read_text(encoding="utf-8")
+    assert "random = 100" in text
+    study.write_text(text.replace("random = 100", "random = 0"), encoding="utf-8")
+    record = read_study(study).with_samples(9)
+    data = Paths(tmp_path, record.name).data
+    problem = record.problem()
+    pp.sweep(problem, path=data, workers=1, progress=False, **record.sweep.arguments(problem))
+    said = palpate("sweep", study, "--status").out
+    assert "9 cases solved" in said
+    assert "goes on" not in said
+
+
 def test_one_cluster_at_a_time(palpate, study, tmp_path):
     answer = palpate("sweep", study, "--cluster", tmp_path / "none.toml", "--scheduler", "tcp://127.0.0.1:1")
     assert answer.code == 2

@@ -100,3 +100,15 @@ def test_adaptive_placement_asks_where_the_answer_tells_most():
         expected.append(yes.sum() * entropy(yes / yes.sum()) + no.sum() * entropy(no / no.sum()))
     best = np.min(expected)
     assert expected[int(placement.choose(state)[0])] == pytest.approx(best, abs=1e-9)
+
+
+def test_a_person_without_lapses_is_placed_too():
+    """Answers that a function without lapses takes for impossible leave a posterior."""
+    placement = Adaptive(LEVELS, Psychometric(lapse=0.0))
+    state = placement.start(1, np.random.default_rng(0))
+    for _ in range(3):
+        for level in (0, len(LEVELS) - 1):
+            wrong = np.array([level == 0])
+            placement.learn(state, np.array([level]), wrong, ~wrong)
+    assert np.isfinite(state["log"]).all()
+    assert 0 <= placement.choose(state)[0] < len(LEVELS)

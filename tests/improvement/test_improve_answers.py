@@ -76,7 +76,7 @@ def test_a_problem_without_touch_is_improved_until_the_error_is_kept(tmp_path):
 
 def test_a_body_that_acts_otherwise_is_refused():
     acting = {"body": {"type": "rod"}, "interactions": [{"type": "pad"}]}
-    with pytest.raises(UsageError, match="under one probe, or for a problem without touch"):
+    with pytest.raises(UsageError, match="under one probe or tool, or for a problem without touch"):
         next(pp.improve(rod_problem(acting), unseen=20))
 
 

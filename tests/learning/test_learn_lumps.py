@@ -80,6 +80,12 @@ def test_a_change_of_the_wrong_sign_is_no_word_of_the_closed_form():
     assert _curvature(presses) == pytest.approx(K, rel=1e-9)
 
 
+def test_a_lump_that_met_no_quadrature_point_is_left_out():
+    presses = _presses(5, 10, seed=0)
+    presses.density[2, 3] = 0.0
+    assert np.isfinite(learn_lumps(presses, units=20).density.weights).all()
+
+
 def test_presses_at_few_places_are_refused():
     with pytest.raises(UsageError, match="4 places or more"):
         learn_lumps(_presses(3, 10, seed=0))

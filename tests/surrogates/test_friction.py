@@ -10,6 +10,7 @@ import pytest
 from touch_made import touch_energy
 
 import palpate as pp
+from held import yielding_rod
 from palpate.errors import UsageError
 from palpate.runtime.touchable import FRICTION, touchable
 from palpate.surrogates.memories import Friction, IwanElements
@@ -144,6 +145,10 @@ def test_friction_on_a_body_that_is_held_is_refused():
     memory = IwanElements(np.ones(1), np.ones(1), np.zeros(1), np.full(1, np.inf))
     with pytest.raises(UsageError, match="has no friction"):
         Friction.over(DEPTH, 0.3, under=memory)
+    with pytest.raises(UsageError, match="has no friction"):
+        yielding_rod().with_friction(0.3)
+    rod = yielding_rod()
+    assert rod.with_friction(0.0).memory is rod.memory
 
 
 def test_the_exponent_is_that_of_the_energy():

@@ -10,6 +10,7 @@ from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from one_node_slurm import DAEMON_PATH, PROGRAMS, jobs, one_node_slurm
 from sweep_problems import Spring
@@ -19,7 +20,7 @@ from palpate.errors import ResourceError, UsageError
 from palpate.sweeps import JobQueue, sweep
 from palpate.sweeps.case import NoTimeLeft, failed_rows
 from palpate.sweeps.plan import make_plan
-from palpate.sweeps.runner import Machines, connect, run
+from palpate.sweeps.runner import Machines, connect, run, seconds_per_case
 from system_programs import require_program
 
 OPTIONS = {"cores": 1, "memory": "500MB", "walltime": "00:02:00"}
@@ -228,12 +229,31 @@ def test_the_end_of_many_jobs_at_once_says_nothing_of_a_chain():
     assert len(client.ended) == 200
 
 
+def test_one_slow_case_does_not_make_all_chains_too_long():
+    rows = {"solve_seconds": np.array([1.0, 1.0, np.nan, 10.0])}
+    assert seconds_per_case(rows) == 4.0
+    assert seconds_per_case({"solve_seconds": np.full(3, np.nan)}) == 0.0
+
+
 def test_a_chain_for_which_no_fresh_job_has_time_is_said():
     plan = make_plan(Spring(), None, 8, 0, None, None)
     client = BusyClient(200, plan.schema, fresh=True)
     asked = (plan.problem, plan.schema, plan.points, plan.chains(), lambda *_: None, 60.0)
     with pytest.raises(ResourceError, match="too short for this sweep"):
         run(Machines(client, lambda: None), *asked)
+
+
+@pytest.mark.full
+def test_jobs_that_end_before_they_solve_are_said(tmp_path, slurm, monkeypatch):
+    for name in ("SLURM_CONF", "PATH"):
+        monkeypatch.setenv(name, slurm[name])
+    monkeypatch.setattr("palpate.sweeps.job_queue._LOOK", 2.0)
+    options = {**OPTIONS, "job_script_prologue": ["exit 1"], "scheduler_options": {"host": "127.0.0.1"}}
+    with (
+        JobQueue("slurm", 2, options, tmp_path) as queue,
+        pytest.raises(ResourceError, match="ended before any of them could solve"),
+    ):
+        sweep(Spring(), samples=8, cluster=queue, progress=False)
 
 
 def test_a_chain_longer_than_a_job_is_said(cluster):

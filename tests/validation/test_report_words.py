@@ -164,6 +164,7 @@ def test_positions_that_count_as_outside_are_explained() -> None:
 TOUCHED = {  # judged of an energy or a memory only, or of answers that no hand feels
     "answer_p95",
     "answer_coverage",
+    "contrast_p95",
     "history_force_median",
     "history_force_p95",
     "history_energy",

@@ -70,7 +70,7 @@ class _Place:
         self.jacobian, self.solved = np.zeros((3, contact.model.nv)), np.zeros((3, contact.model.nv))
         self.other, self.turn = np.zeros((3, contact.model.nv)), np.zeros((3, contact.model.nv))
         self.answer = _Answer()
-        self.torque_at = contact.body.torque_evaluator
+        self.torque_at: Any = contact.body.torque_evaluator
         self.parameters = contact.parameters.copy()
 
 

@@ -64,8 +64,10 @@ def require_same(file: Path, study: Study, choices: PartOptions) -> None:
 
 def chosen_words(study: Study) -> str:
     """Return what was chosen for a part, in one sentence."""
+    from palpate.study.probe_kind import ProbeRecord
     from palpate.study.tool_kind import ToolRecord
 
+    assert isinstance(study.interaction, ProbeRecord | ToolRecord)  # nothing else presses a part
     acting, held = study.interaction, ", ".join(study.body.fixed_names())
     held = "what it stands on" if held == "held" else held
     surface = "the surface that faces up" if acting.touches == "touched" else acting.touches

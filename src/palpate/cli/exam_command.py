@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -35,7 +35,7 @@ def exam(
         list[str] | None,
         typer.Option(
             help="Lump in place of drawn ones: x, y, z and radius (m, or with units) and ratio of moduli, with "
-            "semicolons between: '5 mm; 0; -8 mm; 6 mm; 10'. Several times."
+            "semicolons between: '5 mm; 0 mm; 22 mm; 6 mm; 10' in the breast. Several times."
         ),
     ] = None,
     folder: Annotated[
@@ -72,7 +72,7 @@ def exam(
     elif again is not None:
         _replay(_past(directory, again), console)
     else:
-        server = {"port": port, "strict_port": strict_port, "token": token}
+        server: dict[str, Any] = {"port": port, "strict_port": strict_port, "token": token}
         _open(what, directory, seed, lump or [], device, console, browser=browser, **server)
 
 
@@ -186,7 +186,7 @@ def _lump(text: str) -> Lump:
         raise UsageError(
             f"--lump {text!r} is no lump.",
             why="A lump has five numbers with semicolons between: x, y, z, radius, ratio.",
-            fix="--lump '5 mm; 0 mm; -8 mm; 6 mm; 10'",
+            fix="--lump '5 mm; 0 mm; 22 mm; 6 mm; 10'",
         )
     names = ("x", "y", "z", "radius")
     x, y, z, radius = (

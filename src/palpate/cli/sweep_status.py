@@ -25,7 +25,9 @@ def print_status(study: Path, console: Console) -> None:
 
     record = read_solver_study(study) if says_solver(study) else read_study(study)
     paths = Paths(study.parent, record.name)
-    wanted = {paths.data: record.sweep.samples if record.sweep else None, paths.random: None}
+    wanted = {paths.data: record.sweep.samples if record.sweep else None}
+    if getattr(record.test, "random", None) != 0:  # 0: nothing more is solved for testing
+        wanted[paths.random] = None
     lines, content = [], dict[str, Any]()
     for path, samples in wanted.items():
         progress = read_progress(path)

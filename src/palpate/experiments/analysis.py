@@ -231,9 +231,10 @@ def _ratings(
     medians = defaultdict[tuple[str, str], dict[str, float]](dict)
     for (label, condition), own in rows.items():
         counted = [r for r in own if r["kind"] == "trial"]
-        for item in plan.rating:
+        for rating in plan.rating:
             if counted:
-                medians[condition, item.name][label] = float(np.median([int(r[item.name]) for r in counted]))
+                answers = [int(r[rating.name]) for r in counted]
+                medians[condition, rating.name][label] = float(np.median(answers))
     results = defaultdict[str, dict[str, dict[str, Any]]](dict)
     for (condition, item), own_medians in sorted(medians.items()):
         values = np.array(list(own_medians.values()))

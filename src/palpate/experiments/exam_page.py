@@ -12,6 +12,7 @@ import contextlib
 import logging
 import secrets
 import threading
+import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -63,6 +64,9 @@ MOST_PAGES = 8  # pages that are served at a time
 MESSAGES, MESSAGES_AT_ONCE = 10.0, 40.0  # of a page, per second and at once
 _DRAWS = 20  # of lumps for a practice; four in five have some
 _FORMER = 30  # examinations that the page lists
+_SETTLE = (
+    5.0  # s until a body with learnt lumps is felt: making it takes longer with each lump, which would tell
+)
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"  # of a score
 
 
@@ -99,6 +103,8 @@ class ExamPage(LocalServer):
         self._lumps = None if lumps is None else tuple(lumps)
         for lump in self._lumps or ():
             require_inside(self._body, lump, self._surface.points)
+        if surrogate.lumps is not None:
+            surrogate.lumps.require(self._lumps or ())
         self._practice: Practice | None = None
         self._exam: Examination | None = None
         self._notice, self._score = "", ""
@@ -167,7 +173,7 @@ class ExamPage(LocalServer):
         heard = Bucket(MESSAGES, MESSAGES_AT_ONCE)
         self._pages.append(socket)
         try:
-            await socket.send_text((await run_in_threadpool(self._news)).to_json())
+            await socket.send_text((await run_in_threadpool(self._greet)).to_json())
             while (message := await socket.receive())["type"] != "websocket.disconnect":
                 wish = ExamWish.from_json(message.get("text") or "")
                 news = await run_in_threadpool(self._follow, wish)
@@ -180,6 +186,11 @@ class ExamPage(LocalServer):
             await socket.close(1003, error.what)
         finally:
             self._pages.remove(socket)
+
+    def _greet(self) -> ExamNews:
+        """Return the state for a page that has just come."""
+        with self._turn:
+            return self._news()
 
     def _follow(self, wish: ExamWish) -> ExamNews:
         """Carry out a wish, and return the state after it; a refusal is told in its notice."""
@@ -206,21 +217,24 @@ class ExamPage(LocalServer):
     def _draw(self, seed: int) -> tuple[Lump, ...]:
         return hide_lumps(self.kind, self._body, self._surface, seed, self._surrogate.lumps)
 
-    def _feel(self, lumps: Sequence[Lump], path: Path) -> None:
-        """Put the body with lumps into the hand, from a file that is written first."""
-        body_with_lumps(self._surrogate, self._body, lumps).save(path)
-        self.loop.swap(path)
+    def _with_lumps(self, lumps: Sequence[Lump]) -> Surrogate:
+        return body_with_lumps(self._surrogate, self._body, lumps)
+
+    def _some_lumps(self) -> tuple[Lump, ...]:
+        """Return lumps at random, one at least; a body without room for any is refused."""
+        drawn = (self._draw(secrets.randbits(31)) for _ in range(_DRAWS))
+        if lumps := next(filter(None, drawn), ()):
+            return lumps
+        raise UsageError(
+            "There is no room for a lump in this body.",
+            why="Under the area that can be pressed all lumps would leave it, for their size.",
+            fix="Take a thicker body, or one that was learnt over a larger area.",
+        )
 
     def _practise(self, _: ExamWish) -> None:
-        drawn = (self._draw(secrets.randbits(31)) for _ in range(_DRAWS))
-        lumps = next(filter(None, drawn), ())  # practice without a lump teaches nothing
-        if not lumps:
-            raise UsageError(
-                "There is no room for a lump in this body.",
-                why="Under the area that can be pressed all lumps would leave it, for their size.",
-                fix="Take a thicker body, or one that was learnt over a larger area.",
-            )
-        self._feel(lumps, self._practised)
+        lumps = self._some_lumps()  # practice without a lump teaches nothing
+        self._with_lumps(lumps).save(self._practised)
+        self.loop.swap(self._practised)
         self._practice, self._score = Practice(self.kind, self._body, lumps), ""
 
     def _show(self, _: ExamWish) -> None:
@@ -232,8 +246,13 @@ class ExamPage(LocalServer):
         self._practice = None
 
     def _examine(self, _: ExamWish) -> None:
-        seed = self._seed
+        seed, begun = self._seed, time.monotonic()
+        if self._lumps is None:
+            self._some_lumps()  # a body that can have none would be examined for nothing
         lumps = self._draw(seed) if self._lumps is None else self._lumps
+        felt = self._with_lumps(lumps)
+        if self._surrogate.lumps is not None:
+            time.sleep(max(0.0, begun + _SETTLE - time.monotonic()))
         exam = Examination.begin(
             self.directory,
             self.kind,
@@ -246,7 +265,7 @@ class ExamPage(LocalServer):
         )
         self._seed += 1
         try:
-            self._feel(lumps, exam.felt)
+            felt.save(exam.felt)
             self._take(exam)
         except BaseException:
             exam.close()
@@ -265,9 +284,7 @@ class ExamPage(LocalServer):
         exam = Examination.resume(past.folder, self._clocks)
         try:
             if not exam.felt.is_file():  # it was killed before the body with its lumps was written
-                self._feel(exam.past.lumps, exam.felt)
-            else:
-                self.loop.swap(exam.felt)
+                self._with_lumps(exam.past.lumps).save(exam.felt)
             self._take(exam)
         except BaseException:
             exam.close()
@@ -275,7 +292,8 @@ class ExamPage(LocalServer):
         self._notice = "It goes on where it was interrupted."
 
     def _take(self, exam: Examination) -> None:
-        """Record the touch of an examination from now on."""
+        """Put the body of an examination into the hand, and record its touch from now on."""
+        self.loop.swap(exam.felt)
         self.loop.start_recording(exam.past.next_trace)
         self._exam, self._score = exam, ""
 

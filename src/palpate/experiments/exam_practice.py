@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,8 @@ class Practice:
     def answer(self, number: int, **answers: str) -> None:
         """Say of a mark whether it is hard or soft (`hardness`), deep or shallow (`depth`)."""
         if number in self.marks:
-            self.marks[number] = replace(self.marks[number], **answers)
+            changes: dict[str, Any] = dict(answers)
+            self.marks[number] = replace(self.marks[number], **changes)
 
     def remove(self, number: int) -> None:
         """Remove a mark."""

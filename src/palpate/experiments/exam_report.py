@@ -177,7 +177,7 @@ def map_of(score: ExamScore) -> str:
     tall = float((high - low)[1]) * scale + 2 * _MARGIN
 
     def place(points: np.ndarray) -> np.ndarray:
-        moved = (np.atleast_2d(points) - low) * scale + _MARGIN
+        moved: np.ndarray = (np.atleast_2d(points) - low) * scale + _MARGIN
         moved[:, 1] = tall - moved[:, 1]
         return moved
 

@@ -78,7 +78,7 @@ def match_marks(lumps: Sequence[LumpPlace], radii: Sequence[float], marks: Seque
     away = np.array([[np.linalg.norm(at.above - mark.place) for mark in marks] for at in lumps])
     far = away > np.asarray(radii)[:, None]
     rows, columns = linear_sum_assignment(np.where(far, 1e3, away))  # 1 km: no sum of distances is as long
-    return {int(i): marks[j] for i, j in zip(rows, columns, strict=True) if not far[i, j]}
+    return {int(i): marks[int(j)] for i, j in zip(rows, columns, strict=True) if not far[i, j]}
 
 
 def share_interval(hits: int, count: int) -> tuple[float, float]:

@@ -26,6 +26,7 @@ __all__ = ["Adaptive", "Constant", "Placement", "Staircase"]
 
 _LAPSE = 0.03  # of the person for whom adaptive placement places
 _POINTS = 33  # nodes of its grid along μ and along ln σ
+_LEAST = 1e-9  # probability that is never certain
 _REVERSALS = 4  # that a staircase's estimate leaves out, while it still comes down
 
 
@@ -163,7 +164,8 @@ class Adaptive:
         )
         mu, spread, lapse, guess, _ = coarse.axes(levels)
         m, s = (a.ravel() for a in np.meshgrid(mu, spread, indexing="ij"))
-        self._yes = coarse.probability(levels[:, None], m, np.exp(s), lapse, guess)
+        yes = coarse.probability(levels[:, None], m, np.exp(s), lapse, guess)
+        self._yes = np.clip(yes, _LEAST, 1.0 - _LEAST)  # without lapses some would be certain
         self._doubt = _entropy(self._yes)
         self._log_yes, self._log_no = np.log(self._yes), np.log1p(-self._yes)
 

@@ -108,11 +108,13 @@ class Stimuli:
             known = self.bodies[name].parameters[place]
             base = 1.0 if self.plan.question == "detection" else self._middle(name)[place]
             ends = [base * self.plan.value(float(x)) for x in self.plan.levels[[0, -1]]]
+            if self.plan.question == "detection" and self.plan.vary.absent is not None:
+                ends.append(self.plan.vary.absent)
             if min(ends) < known.low - 1e-12 or max(ends) > known.high + 1e-12:
                 raise UsageError(
                     f"The levels of {what} go from {min(ends):.4g} to {max(ends):.4g} {known.unit}.",
                     why=f"{name} was trained from {known.low:.4g} to {known.high:.4g} {known.unit}.",
-                    fix="Bring vary.low and vary.high closer together, or learn a wider range.",
+                    fix="Bring vary.low, vary.high and vary.absent inside, or learn a wider range.",
                 )
 
     def _middle(self, name: str) -> list[float]:

@@ -30,6 +30,7 @@ def learn_arm(
 
     `inputs` are those of the energy beside which it is learnt, `matrices` (k, 3, 3) the symmetry of body and tool, the
     identity among it, and `about` (3,) the point that stays, m. An arm turns with the body; a mirror turns it round.
+    Images count where no solve is: among solves they would let a network look better, left out, than it is.
     """
     if "torque" not in data:
         return None
@@ -47,6 +48,9 @@ def learn_arm(
     if matrices is not None and len(matrices) > 1:
         point = np.zeros(3) if about is None else about
         images = [((X[:, :3] - point) @ M.T + point, np.linalg.det(M) * arm @ M.T) for M in matrices]
-        X = np.vstack([np.hstack([places, X[:, 3:]]) for places, _ in images])
-        arm = np.vstack([turned for _, turned in images])
+        places, turned = (np.vstack(parts) for parts in zip(*images, strict=True))
+        low, high = X[:, :3].min(axis=0), X[:, :3].max(axis=0)
+        new = ((places < low) | (places > high)).any(axis=1)
+        X = np.vstack([X, np.hstack([places, np.tile(X[:, 3:], (len(matrices), 1))])[new]])
+        arm = np.vstack([arm, turned[new]])
     return fit(X, arm, list(inputs), list(ARM_OUTPUTS), options=options)

@@ -40,15 +40,15 @@ def with_friction(
     """
     static = kinetic if static is None else static
     require_coefficients(static, kinetic)
+    under = None if memory is None else memory.of_body
+    if static == 0.0:
+        return under
     if energy.baseline.holds:
         raise UsageError(
             "A body that is held has no friction.",
             why="The hand holds a place of it, and no tool slides on its surface.",
             fix="Learn the body under a ball or another tool that presses it.",
         )
-    under = None if memory is None else memory.of_body
-    if static == 0.0:
-        return under
     exponent, depth = _press(energy)
     return Friction.over(depth, kinetic, static, exponent=exponent, ratio=ratio, under=under)
 

@@ -12,6 +12,8 @@ import inspect
 import os
 import re
 import shutil
+import subprocess
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -53,6 +55,8 @@ _SETTLED = frozenset(
     }
 )
 _EXAMPLE = '[slurm]\njobs = 10\ncores = 4\nmemory = "8GB"\nwalltime = "01:00:00"\nqueue = "normal"'
+_LOOK = 10.0  # s between looks at the queue, and how long its answer may take
+_MOST_LOST = 5
 _WAIT = "30s"  # after which a worker without a scheduler ends, and with it its job
 
 
@@ -89,6 +93,11 @@ class JobQueue:
     options: Mapping[str, Any]
     folder: Path
     _running: Any = field(default=None, init=False, repr=False)
+    _looked: float = field(
+        default=0.0, init=False, repr=False
+    )  # monotonic time of the last look at the queue, s
+    _has_solved: bool = field(default=False, init=False, repr=False)  # whether a job has ever connected
+    _lost: int = field(default=0, init=False, repr=False)  # jobs that were gone before any had connected
 
     warning = ""
 
@@ -151,6 +160,41 @@ class JobQueue:
         if self._running is None:
             self._running = self._open()
         return self._running
+
+    def replace_lost(self) -> None:
+        """Ask for others in place of jobs that were gone before they connected, of which Dask hears nothing.
+
+        Only SLURM is asked which jobs it has.
+
+        Raises
+        ------
+        ResourceError
+            If so many were gone and none has ever connected.
+        """
+        cluster = self._running
+        if self.kind != "slurm" or cluster is None or time.monotonic() - self._looked < _LOOK:
+            return
+        self._looked = time.monotonic()
+        asked = ["squeue", "--noheader", "--me", "--format=%A"]
+        try:
+            told = subprocess.run(asked, capture_output=True, text=True, timeout=_LOOK, check=False)
+        except (OSError, subprocess.TimeoutExpired):
+            return  # a queue that is busy now
+        connected = {worker["name"] for worker in cluster.scheduler_info["workers"].values()}
+        self._has_solved = self._has_solved or bool(connected)
+        there = set(told.stdout.split())
+        handed_in = {name: job.job_id for name, job in list(cluster.workers.items())}
+        gone = [name for name, number in handed_in.items() if number not in there and name not in connected]
+        if told.returncode or not gone:
+            return
+        self._lost += len(gone)
+        if not self._has_solved and self._lost >= _MOST_LOST:
+            raise ResourceError(
+                f"{count(self._lost, 'job')} of the queue ended before any of them could solve.",
+                why=f"Their logs are in {self.folder}: the nodes may lack this Python, or not reach this machine.",
+                fix="See to what they say; python, job_script_prologue and interface are options of the queue's file.",
+            )
+        cluster.sync(cluster.scale_down, gone)
 
     def __enter__(self) -> JobQueue:
         return self

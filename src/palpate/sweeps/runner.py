@@ -36,7 +36,7 @@ from palpate.sweeps.problem import Problem
 if TYPE_CHECKING:
     import distributed
 
-__all__ = ["Machines", "connect", "deferred_interrupt", "longest", "run"]
+__all__ = ["Machines", "connect", "deferred_interrupt", "run", "seconds_per_case"]
 
 _PATIENCE = 0.5  # s between looks at the workers
 _FETCH = 5.0  # s; Dask's client may wait for ever for a result whose worker died just after it
@@ -45,7 +45,7 @@ _JOB_TRIES = 20  # the same where a queue ends workers for reasons of its own
 _AHEAD = 4  # chains that are handed in, for each that is solved at once: their problem takes memory
 _LEAST_AHEAD = 16
 _LOOK = 5.0  # s between looks at how many workers there are
-_SLACK = 1.5  # what a case may take, over the longest one that was seen
+_SLACK = 1.5  # what the cases of a chain may take, over those of the slowest one that was seen
 _KEPT = "What is solved is kept where the sweep has a path: the same command goes on."
 
 
@@ -70,15 +70,18 @@ def connect(cluster: Any, workers: int | None) -> Iterator[Machines]:
     import distributed
 
     known: dict[str, Any] = {}
+    revive: Callable[[], None] = _nothing
     with contextlib.ExitStack() as stack:
         if cluster is None:
             cluster = stack.enter_context(local_cluster(workers))
         elif isinstance(cluster, JobQueue):
             known = {"tries": _JOB_TRIES, "slots": cluster.slots, "job_seconds": cluster.seconds or math.inf}
+            revive = cluster.replace_lost
             cluster = cluster.start()
         elif isinstance(cluster, OnDemandCluster):
             cluster = cluster.start()
-        revive = cluster.revive if isinstance(cluster, LocalCluster) else _nothing
+        if isinstance(cluster, LocalCluster):
+            revive = cluster.revive
         if isinstance(cluster, distributed.Client):
             yield Machines(cluster, revive, **known)
         else:
@@ -152,8 +155,9 @@ def run(
     given to another too, and that worker ends.
 
     The inputs `points` (N, n) are solved by `chains` of their rows, a case within `case_limit` seconds, and `accept`
-    takes rows and their answers. The schema has the bookkeeping too; `slowest` is the longest time of a case in s that
-    is known. A scheduler that is lost, and a chain that takes longer than a job may, are ResourceErrors.
+    takes rows and their answers. The schema has the bookkeeping too; `slowest` is the largest mean time of a chain's
+    cases in s that is known: one slow case alone does not make all chains too long for a job. A scheduler that is
+    lost, and a chain that takes longer than a job may, are ResourceErrors.
     """
     client, finished = machines.client, queue.SimpleQueue[Any]()
     waiting = collections.deque(_Chain(rows) for rows in chains)
@@ -185,7 +189,7 @@ def run(
             answers, error = _outcome(client, future)
             if answers is not None:
                 refused.clear()
-                slowest = max(slowest, longest(answers))
+                slowest = max(slowest, seconds_per_case(answers))
                 accept(chain.rows, answers)
             elif isinstance(error, NoTimeLeft):
                 # at the end of many jobs at once all of their workers refuse: that says nothing of the chain
@@ -215,10 +219,11 @@ class _Ahead:
         return self._most
 
 
-def longest(answers: Columns) -> float:
-    """Return the longest time of a solve in s among some rows; 0 where none is known."""
+def seconds_per_case(answers: Columns) -> float:
+    """Return the mean time of a solve in s over some rows; 0 where none is known."""
     seconds = answers["solve_seconds"]
-    return float(np.max(seconds, initial=0.0, where=np.isfinite(seconds)))
+    known = seconds[np.isfinite(seconds)]
+    return float(known.mean()) if known.size else 0.0
 
 
 def _too_short(needed: float, given: float, cases: int) -> ResourceError:

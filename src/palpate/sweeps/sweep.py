@@ -19,7 +19,7 @@ from palpate.processes import CASE_LIMIT
 from palpate.sweeps.case import Columns, empty, put
 from palpate.sweeps.ledger import Ledger
 from palpate.sweeps.plan import Plan, make_plan
-from palpate.sweeps.runner import connect, longest, run
+from palpate.sweeps.runner import connect, run, seconds_per_case
 from palpate.sweeps.space import Design
 
 __all__ = ["Report", "reporter", "sweep"]
@@ -136,7 +136,7 @@ def _solve(
                     unsolved,
                     accept,
                     case_limit,
-                    longest(columns),
+                    seconds_per_case(columns),
                 )
     data = plan.label(columns, np.arange(len(plan.points)))
     return ledger.finish(data) if ledger else data

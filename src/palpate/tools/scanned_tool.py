@@ -112,7 +112,8 @@ class ScannedTool(Tool):
         The ranks are the least that leave two thousandths of the spacing where the distance is one.
         """
         sides = [
-            np.linalg.svd(np.moveaxis(values, k, 0).reshape(n, -1))[0] for k, n in enumerate(values.shape)
+            np.linalg.svd(np.moveaxis(values, k, 0).reshape(n, -1), full_matrices=False)[0]
+            for k, n in enumerate(values.shape)
         ]
         near, allowed = np.abs(values) <= sizes[2], _ALLOWED * spacing
         for rank in range(1, max(values.shape) + 1):

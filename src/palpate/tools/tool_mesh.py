@@ -44,7 +44,7 @@ def tool_mesh(shape: Tool) -> ToolMesh:
     normals = np.stack(
         np.broadcast_arrays(np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), -np.cos(tilt)), axis=-1
     )
-    points = _facing(shape, normals.reshape(-1, 3)).reshape(normals.shape)
+    points: np.ndarray = _facing(shape, normals.reshape(-1, 3)).reshape(normals.shape)
     if last < math.pi:
         points, normals = _with_shaft(shape, points, normals, last, columns)
     return ToolMesh(

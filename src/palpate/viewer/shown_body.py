@@ -320,7 +320,8 @@ def _vtu_step(mesh: Grid, label: str) -> ShownStep:
     energy = np.ravel(notes["potential energy"])[0] if "potential energy" in notes else None
     response = np.ravel(notes["response"]) if "response" in notes else None
     displacement = np.asarray(mesh.point_data.get("displacement", np.zeros((count, 3))), dtype=float)
-    return ShownStep(displacement, values, ball, label, _figures(response, energy, ball))
+    figures = _figures(response, energy, ball)
+    return ShownStep(displacement, values, ball, label=label, figures=figures)
 
 
 def _read(path: Path) -> Grid:

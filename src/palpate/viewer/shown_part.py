@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from palpate.errors import UsageError
+from palpate.errors import PalpateError, UsageError
 from palpate.format import bound, millimetres, share
 from palpate.tools import PosedTool
 from palpate.tools.tool_sizes import (
@@ -323,7 +323,7 @@ def _title(key: str) -> str:
     }.get(key, f"The {key}")
 
 
-def error_line(error: UsageError) -> str:
+def error_line(error: PalpateError) -> str:
     """Return what, why and fix of an error in one line."""
     return " ".join(filter(None, (error.what, error.why, error.fix)))
 

@@ -91,12 +91,13 @@ class LumpPresses:
         lower, upper = map(np.array, record["room"])
         sizes = Range("radius", least, largest, "m"), Range("ratio", softest, hardest)
         room = LumpRoom(lower, upper, *sizes, record["cover"], skin_of(data.rest, data.triangles))
-        names = ("place", "radius", "energy", "slope", "compliance", "ratio", "added", "force")
-        lumps: Any = [np.asarray(data[f"lump_{name}"]) for name in names]
-        symmetry, about = declared_symmetry(data)
-        return cls(
-            data.X, data.potential_energy, data.response, *lumps, room=room, symmetry=symmetry, about=about
-        )
+        columns = {
+            "density": "energy", "change": "force",
+            **{name: name for name in ("place", "radius", "slope", "compliance", "ratio", "added")},
+        }  # fmt: skip
+        lumps: dict[str, Any] = {own: np.asarray(data[f"lump_{name}"]) for own, name in columns.items()}
+        lumps["symmetry"], lumps["about"] = declared_symmetry(data)
+        return cls(data.X, data.potential_energy, data.response, room=room, **lumps)
 
     def take(self, rows: np.ndarray) -> LumpPresses:
         """Return some of the presses."""
@@ -240,7 +241,8 @@ def _rows(presses: LumpPresses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(0)
     order = np.argsort(rng.random((N * L, len(group))), axis=1)[:, :count]  # other images for each lookup
     M = group[order.ravel()]
-    index = np.repeat(np.stack(np.divmod(np.arange(N * L), L), axis=1), count, axis=0)
+    inside = np.repeat(presses.density.ravel() > 0, count)  # a small lump may meet no quadrature point
+    M, index = M[inside], np.repeat(np.stack(np.divmod(np.arange(N * L), L), axis=1), count, axis=0)[inside]
     X = about + np.einsum("nij,nj->ni", M, presses.X[index[:, 0]] - about)
     P = about + np.einsum("nij,nj->ni", M, presses.place[index[:, 0], index[:, 1]] - about)
     return contrast_inputs(X, P, presses.radius[index[:, 0], index[:, 1]]), M, index

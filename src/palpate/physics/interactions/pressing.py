@@ -164,9 +164,9 @@ class PressingTool(PlainInteraction):
         while len(contacts) < number:  # a surface need not fill its box
             unit = np.concatenate([unit, engine.random(1 << max(3, int(np.ceil(np.log2(number)))))])
             contacts, normals, hit = self._contact_points(self._patch(geometry), unit[:, :2])
-        depths = np.array([depth_series(self.depth, count, shift) for shift in unit[hit][:number, 2]])
+        series = np.array([depth_series(self.depth, count, shift) for shift in unit[hit][:number, 2]])
         rows = self._over(
-            contacts[:number], normals[:number], depths, self.spread_angles(unit[hit][:number, 3:])
+            contacts[:number], normals[:number], series, self.spread_angles(unit[hit][:number, 3:])
         )
         return rows[:samples]
 

@@ -55,7 +55,7 @@ def natural_frequency(problem: SolidProblem) -> float | None:
     def times_mass(values: Any) -> np.ndarray:
         vector.FV().NumPy()[:] = np.ravel(values)
         image.data = mass.mat * vector
-        return np.array(image.FV().NumPy()) * system.free
+        return np.asarray(np.array(image.FV().NumPy()) * system.free)
 
     shape = (field.size, field.size)
     start = np.random.default_rng(0).standard_normal(field.size) * system.free * field.moving

@@ -239,7 +239,7 @@ def depth_series(X: np.ndarray, surface: TouchedSurface, radius: float) -> np.nd
 
 
 @part
-def _enter(position, parameters, moved, base, small, numbers, args) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _enter(position, parameters, moved, base, small, numbers, args):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Fill the law's energy and derivatives; move the place at which ℓ is asked to the saturated depth."""
     own, surface = args
     which = int(own[_RADIUS_INPUT])

@@ -189,7 +189,7 @@ def _turn_into(angles, own, scratch) -> None:  # type: ignore[no-untyped-def]  #
 
 
 @part
-def _depth_into(place, slope, bend, numbers, surface, balls, scratch) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _depth_into(place, slope, bend, numbers, surface, balls, scratch):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Mean depth s at a place (3,) in the orientation in scratch, −∂s/∂p and −∂²s/∂p²; the least gap where all miss."""
     R, D, at, n = scratch[_TURN], scratch[_BALL_BEND], scratch[_LINES, 1], scratch[_LINES, 2]
     order, scale = numbers[_ORDER], numbers[_SCALE]
@@ -232,7 +232,7 @@ def _depths_into(X, depths, slopes, bends, numbers, surface, balls, turn, scratc
 
 
 @part
-def _enter_posed(position, parameters, moved, base, small, numbers, args) -> bool:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _enter_posed(position, parameters, moved, base, small, numbers, args):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Fill the law's energy and derivatives; move the place at which ℓ is asked to the saturated depth."""
     own, surface, balls, turn, scratch = args
     _turn_into(parameters, turn, scratch)

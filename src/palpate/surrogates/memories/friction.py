@@ -102,7 +102,7 @@ def _contact(q, slope, force, exponent, depths):  # type: ignore[no-untyped-def]
 
 
 @part
-def _settle(f, slope, old, k, limit) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _settle(f, slope, old, k, limit):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Take a spring's force (3,) into the plane across the slope and to a new k and limit; return what is lost, J."""
     across, steep, stored = 0.0, _norm(slope), _norm(f) ** 2 / (2.0 * old)
     for a in range(3):
@@ -119,7 +119,7 @@ def _settle(f, slope, old, k, limit) -> float:  # type: ignore[no-untyped-def]  
 
 
 @part
-def _stretch(f, way, k, limit) -> float:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def _stretch(f, way, k, limit):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Move a spring's end by a way (3,) in m; return how far it slips, m."""
     for a in range(3):
         f[a] -= k * way[a]

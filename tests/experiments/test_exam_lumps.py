@@ -10,10 +10,12 @@ import pytest
 from examined import plane, slab
 
 import pressed
+import tooled
 from palpate.errors import UsageError
 from palpate.experiments.exam_kinds import hide_lumps, kind_of_body
 from palpate.experiments.exam_lumps import body_with_lumps, place_of, require_inside, schematic_lumps
 from palpate.experiments.exam_touch import ExamSurface
+from palpate.runtime.touchable import touchable
 from palpate.surrogates import Lump
 
 LUMP = Lump((0.005, -0.004, -0.009), 0.005, 8.0)
@@ -51,6 +53,12 @@ def test_the_deviation_of_the_force_does_not_tell_whether_there_are_lumps():
     body = pressed.surrogate().with_energy(replace(energy, root=np.eye(4 + energy.network.units)))
     for lumps in ([], [LUMP]):
         assert body_with_lumps(body, slab(), lumps).hand_energy.root is None
+
+
+def test_a_body_under_a_tool_takes_no_lumps():
+    body = tooled.surrogate()
+    with pytest.raises(UsageError, match="can't have lumps yet"):
+        body_with_lumps(body, touchable(body), [LUMP])
 
 
 def test_the_signal_is_half_as_strong_beside_a_lump_where_boussinesq_has_it():

@@ -54,7 +54,7 @@ def write_plan(
     from palpate.files import write_file
 
     file = out or Path(f"{name}.toml")
-    files = [_seen_from(file.parent, body) for body in bodies or ()]
+    files = [_path_from(file.parent, body) for body in bodies or ()]
     text = ready_plan(kind, name, files or ["body.palpate", "other.palpate"])
     if show:
         typer.echo(text)
@@ -69,7 +69,7 @@ def write_plan(
     Console().result(f"{file}: edit it, then `palpate experiment simulate {file}`.", {})
 
 
-def _seen_from(folder: Path, body: Path) -> str:
+def _path_from(folder: Path, body: Path) -> str:
     """Return the path of a body as a plan in a folder names it."""
     if body.is_absolute():
         return str(body)

@@ -106,7 +106,7 @@ class Conductor:
 
     def hear(self, message: Mapping[str, Any]) -> None:
         """Take a message of the participant's page: the hand, consent, going on, an answer."""
-        with self._lock, self._failing():
+        with self._lock, self._errors_in_words():
             self._heard = self._clock()
             self._hidden = bool(message.get("hidden", False))
             hand = message.get("hand")
@@ -123,7 +123,7 @@ class Conductor:
 
     def command(self, message: Mapping[str, Any]) -> None:
         """Take a message of the control page: pause, resume, end, a note."""
-        with self._lock, self._failing():
+        with self._lock, self._errors_in_words():
             wish = message.get("wish")
             if wish == "pause" and self.phase not in {"paused", "done", "failed", "consent"}:
                 self._drop("The experimenter paused.")
@@ -198,12 +198,12 @@ class Conductor:
         with self._lock:
             if self.phase in {"done", "failed"}:
                 return
-            with self._failing():
+            with self._errors_in_words():
                 self._look()
                 self._go_on()
 
     @contextlib.contextmanager
-    def _failing(self) -> Iterator[None]:
+    def _errors_in_words(self) -> Iterator[None]:
         """End the sitting in words where a device or the disk fails."""
         try:
             yield

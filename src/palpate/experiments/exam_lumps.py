@@ -24,6 +24,7 @@ import numpy as np
 from palpate.errors import UsageError
 from palpate.format import millimetres
 from palpate.surrogates import Lump, Surrogate
+from palpate.surrogates.baselines import require_ball
 
 if TYPE_CHECKING:
     from palpate.runtime.touchable import Touchable
@@ -90,6 +91,7 @@ def body_with_lumps(surrogate: Surrogate, body: Touchable, lumps: Sequence[Lump]
     `body` is the surrogate as a hand finds it. With schematic lumps the posterior is left out, also where there are
     none: else the deviation of the force on the page would tell whether there are.
     """
+    require_ball(body.energy.baseline, "have lumps")
     if surrogate.lumps is not None:
         return surrogate.with_lumps(lumps)
     lumped = schematic_lumps(surrogate, body, lumps)

@@ -217,7 +217,7 @@ class ExamPage(LocalServer):
     def _draw(self, seed: int) -> tuple[Lump, ...]:
         return hide_lumps(self.kind, self._body, self._surface, seed, self._surrogate.lumps)
 
-    def _lumped(self, lumps: Sequence[Lump]) -> Surrogate:
+    def _with_lumps(self, lumps: Sequence[Lump]) -> Surrogate:
         return body_with_lumps(self._surrogate, self._body, lumps)
 
     def _some_lumps(self) -> tuple[Lump, ...]:
@@ -233,7 +233,7 @@ class ExamPage(LocalServer):
 
     def _practise(self, _: ExamWish) -> None:
         lumps = self._some_lumps()  # practice without a lump teaches nothing
-        self._lumped(lumps).save(self._practised)
+        self._with_lumps(lumps).save(self._practised)
         self.loop.swap(self._practised)
         self._practice, self._score = Practice(self.kind, self._body, lumps), ""
 
@@ -250,7 +250,7 @@ class ExamPage(LocalServer):
         if self._lumps is None:
             self._some_lumps()  # a body that can have none would be examined for nothing
         lumps = self._draw(seed) if self._lumps is None else self._lumps
-        felt = self._lumped(lumps)
+        felt = self._with_lumps(lumps)
         if self._surrogate.lumps is not None:
             time.sleep(max(0.0, begun + _SETTLE - time.monotonic()))
         exam = Examination.begin(
@@ -284,7 +284,7 @@ class ExamPage(LocalServer):
         exam = Examination.resume(past.folder, self._clocks)
         try:
             if not exam.felt.is_file():  # it was killed before the body with its lumps was written
-                self._lumped(exam.past.lumps).save(exam.felt)
+                self._with_lumps(exam.past.lumps).save(exam.felt)
             self._take(exam)
         except BaseException:
             exam.close()

@@ -82,7 +82,7 @@ def contact(law: str, stiff: float) -> list[str]:
 
 
 def block(across: np.ndarray, along: np.ndarray, down: np.ndarray) -> list[str]:
-    """Nodes, elements and sets from the ends of elements along x, y and −z, all from small to large; the top is z = 0."""
+    """Nodes, elements and sets from the ends of elements along x, y and −z, each from small to large; z = 0 on top."""
     x, y, z = (
         np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2])).tolist() for ends in (across, along, down)
     )

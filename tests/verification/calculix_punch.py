@@ -15,12 +15,17 @@ from calculix_ball import KILO, MILLI, block, contact, graded
 
 REACH = 1.3  # of the fine part over the punch's radius
 DEEP = 0.8  # the same downwards
-SECTORS, ARC = 32, 10  # facets around half the punch and along its edge: 0.12 % of either radius inside it at most
+SECTORS, ARC = (
+    32,
+    10,
+)  # facets around half the punch and along its edge: 0.12 % of either radius inside it at most
 FLAT = 5  # rings of facets on its face
 STEEP = math.radians(80)  # as far as the rounded edge is there
 THICK = 0.1  # of the shell, over the distance from a point on the axis
 FIRST = 1_000_000  # of the numbers of nodes and elements that the block does not have
-PENALTY = 300.0  # stiffness of the penalty over E/a: by the mean pressure of Boussinesq it takes 0.3 % of the depth
+PENALTY = (
+    300.0  # stiffness of the penalty over E/a: by the mean pressure of Boussinesq it takes 0.3 % of the depth
+)
 
 
 @dataclass(frozen=True)
@@ -47,9 +52,12 @@ class Tilted:
         slopes = np.linspace(0.0, STEEP, ARC + 1)
         r = np.concatenate([np.linspace(0.0, flat, FLAT, endpoint=False), flat + self.edge * np.sin(slopes)])
         z = np.concatenate([np.zeros(FLAT), self.edge * (1 - np.cos(slopes))])
-        around = np.pi * np.arange(-1, SECTORS + 2) / SECTORS  # a sector beyond the plane of symmetry on both sides
+        around = (
+            np.pi * np.arange(-1, SECTORS + 2) / SECTORS
+        )  # a sector beyond the plane of symmetry on both sides
         out = np.stack(
-            [r[:, None] * np.cos(around), r[:, None] * np.sin(around), np.repeat(z[:, None], around.size, 1)], -1
+            [r[:, None] * np.cos(around), r[:, None] * np.sin(around), np.repeat(z[:, None], around.size, 1)],
+            -1,
         )
         middle = np.array([0.0, 0.0, self.radius])
         layers = np.stack([out, middle + (1 - THICK) * (out - middle)])
@@ -100,8 +108,10 @@ def _shell(punch: Tilted) -> list[str]:
     lines = ["*NODE, NSET=TOOLNODES"]
     used = np.ones((2, rings, around), bool)
     used[:, 0, 1:] = False  # the axis has one node
-    for i in np.flatnonzero(used):
-        lines.append(", ".join([str(FIRST + i), *(f"{x:.12g}" for x in nodes.reshape(-1, 3)[i])]))
+    places = nodes.reshape(-1, 3)  # a number may have 20 signs
+    lines += [
+        ", ".join([str(FIRST + i), *(f"{x:.12g}" for x in places[i])]) for i in np.flatnonzero(used).tolist()
+    ]
     for kind in ("C3D6", "C3D8"):
         lines.append(f"*ELEMENT, TYPE={kind}, ELSET=TOOL")
         for i, j in np.ndindex(rings - 1, around - 1):

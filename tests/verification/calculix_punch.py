@@ -108,8 +108,10 @@ def _shell(punch: Tilted) -> list[str]:
     lines = ["*NODE, NSET=TOOLNODES"]
     used = np.ones((2, rings, around), bool)
     used[:, 0, 1:] = False  # the axis has one node
-    places = nodes.reshape(-1, 3)
-    lines.extend(", ".join([str(FIRST + i), *(f"{x:.12g}" for x in places[i])]) for i in np.flatnonzero(used))
+    places = nodes.reshape(-1, 3)  # a number may have 20 signs
+    lines += [
+        ", ".join([str(FIRST + i), *(f"{x:.12g}" for x in places[i])]) for i in np.flatnonzero(used).tolist()
+    ]
     for kind in ("C3D6", "C3D8"):
         lines.append(f"*ELEMENT, TYPE={kind}, ELSET=TOOL")
         for i, j in np.ndindex(rings - 1, around - 1):

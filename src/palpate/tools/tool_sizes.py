@@ -90,10 +90,7 @@ def suitable_tool(name: str, radius: float) -> PosedTool:
 
 
 def tool_by_name(name: str, sizes: Mapping[str, float]) -> PosedTool:
-    """Return a tool by its name and all of its sizes in m and rad.
-
-    A name that is not known, or sizes that are not those of this tool, are a UsageError.
-    """
+    """Return a tool by its name and all of its sizes in m and rad; others than those of this tool are a UsageError."""
     usual = _usual(name)
     own = {key: value for key, value in sizes.items() if key not in TURNS}
     wanted = [key for key in sizes_of(PosedTool(usual)) if key not in TURNS]

@@ -20,23 +20,9 @@ __all__ = ["GaussianSum"]
 class GaussianSum:
     """f(z) = t₀ + t·ξ + Σ w_k exp(−‖(ξ − μ_k)/σ‖²) in scaled inputs ξ = (z − middle)/half.
 
-    Attributes
-    ----------
-    middle, half : (n,)
-        Of each input's range, in its unit.
-    centres : (h, n)
-        μ_k, scaled.
-    widths : (n,)
-        σ, scaled, positive.
-    weights : (h,)
-        w_k.
-    tail : (1 + n,)
-        t₀, t.
-
-    Raises
-    ------
-    UsageError
-        If the arrays don't fit together, or a width or half a range is not positive.
+    `middle` and `half` (n,) are of each input's range, in its unit; `centres` (h, n) are μ_k and `widths` (n,) σ,
+    scaled and positive; `weights` (h,) are w_k and `tail` (1 + n,) t₀ and t. Arrays that don't fit together, and a
+    width or half a range that is not positive, are a UsageError.
     """
 
     middle: np.ndarray

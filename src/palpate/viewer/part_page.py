@@ -262,7 +262,7 @@ class PartPage(LocalServer):
 
     def _open(self, model: PageModel, path: str | os.PathLike[str], limits: Mapping[str, Any]) -> None:
         """Start the real-time process with a study's limits, the device's by default, and a session for its pages."""
-        own = {name: limits.get(name) for name in ("max_force", "max_torque")}
+        own: dict[str, Any] = {name: limits.get(name) for name in ("max_force", "max_torque")}
         loop = LoopProcess(path, device=self._device, **own)
         self.loop = self._closing.enter_context(loop)
         hand = hand_kind(self._device)

@@ -244,7 +244,7 @@ def _size_problems(wish: StartWish, room: np.ndarray) -> dict[str, str]:
         return problems
     first, last = (
         next(iter(wish.sizes), ""),
-        next((key for key in reversed(wish.sizes) if key not in TURNS), ""),
+        next((key for key in reversed(list(wish.sizes)) if key not in TURNS), ""),
     )
     try:
         tool = wished_tool(wish)

@@ -103,7 +103,7 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
     rivals = None if options.get("choose") is False else pressed.overlap_baselines
     mirror = {"matrices": pressed.matrices, "about": pressed.about}
     learn = partial(learn_arm, pressed.data, pressed.inputs, **mirror)
-    numbers = {} if pressed.tool is None else {ARM: learn}
+    numbers = {} if pressed.tool is None or pressed.angles else {ARM: learn}  # turns tell the torque
     return Recognised(
         baseline,
         pressed.solves,

@@ -101,8 +101,7 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
     deepest = {"deepest": pressed.deepest or None}
     # a law that was asked for is taken as it is
     rivals = None if options.get("choose") is False else pressed.overlap_baselines
-    mirror = {"matrices": pressed.matrices, "about": pressed.about}
-    learn = partial(learn_arm, pressed.data, pressed.inputs, **mirror)
+    learn = partial(learn_arm, pressed.data, pressed.inputs, matrices=pressed.matrices, about=pressed.about)
     numbers = {} if pressed.tool is None or pressed.angles else {ARM: learn}  # turns tell the torque
     return Recognised(
         baseline,

@@ -134,6 +134,23 @@ def test_a_tool_leaves_as_an_fmu_with_its_torque(body, tmp_path, version):
     assert done.comparison.parts["torque"].relative < 1e-9
 
 
+def test_mirror_images_among_the_solves_are_not_learnt():
+    """Left out, a solve would be told by its image beside it, and a network that swings between the two pass."""
+    from palpate.learning.learn_arm import learn_arm
+    from palpate.options import FitOptions
+
+    X, mirror = pressed.places(60), np.diag([-1.0, 1.0, 1.0])
+    X[0, 0], X[1, 0] = X[:, 0].max() + 1e-4, -(X[:, 0].max() + 1e-4)
+    X[:, 0] = np.clip(X[:, 0], X[1, 0], X[0, 0])
+    arms = 0.1 * X  # no mirror leaves it as it is: images would change what is learnt
+    data = pressed.dataset(pressed.solves(X), torque=np.linalg.norm(pressed.force(X), axis=1)[:, None] * arms)
+    learnt = [
+        learn_arm(data, data.ranges, FitOptions(), matrices=matrices, about=np.zeros(3))
+        for matrices in (None, np.array([np.eye(3), mirror]))
+    ]
+    np.testing.assert_array_equal(*(one.predict(pressed.places(40, seed=9)) for one in learnt))
+
+
 def test_an_arm_is_learnt_from_mirror_images_too():
     """Solves on one side of a mirror plane tell the other: an arm along the mirror's normal turns round there."""
     from palpate.learning.learn_arm import learn_arm

@@ -102,8 +102,7 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
     # a law that was asked for is taken as it is
     rivals = None if options.get("choose") is False else pressed.overlap_baselines
     learn = partial(learn_arm, pressed.data, pressed.inputs, matrices=pressed.matrices, about=pressed.about)
-    # of a tool that turns the energy tells the torque
-    numbers = {} if pressed.tool is None or pressed.angles else {ARM: learn}
+    numbers = {} if pressed.tool is None or pressed.angles else {ARM: learn}  # turns tell the torque
     return Recognised(
         baseline,
         pressed.solves,

@@ -8,12 +8,11 @@ this machine, where whoever may read the user's files can look.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import secrets
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -45,13 +44,12 @@ from palpate.surrogates import Lump, Surrogate
 from palpate.viewer.exam_messages import ExamMark, ExamNews, ExamWish, FormerExam
 from palpate.viewer.messages import PROTOCOL
 from palpate.viewer.page_model import PageModel
-from palpate.viewer.server import body_routes
+from palpate.viewer.server import application
 from palpate.viewer.session import Session
 from palpate.viewer.traffic import Bucket, tell_all
 from palpate.viewer.web_server import (
     LocalServer,
     ServerOptions,
-    local_application,
     skeleton,
     wait_until_interrupted,
 )
@@ -133,13 +131,6 @@ class ExamPage(LocalServer):
         hand = hand_kind(self._device)
         session = Session(PageModel(self._body), self.loop, hand, self._device)
 
-        @contextlib.asynccontextmanager
-        async def lifespan(_: Starlette) -> AsyncIterator[None]:
-            watcher = asyncio.create_task(session.watch())
-            yield
-            watcher.cancel()
-            await asyncio.gather(watcher, return_exceptions=True)
-
         html = skeleton("exam")
 
         async def page(_: Request) -> Response:
@@ -150,7 +141,7 @@ class ExamPage(LocalServer):
             Route("/exams/{name}", self._answer_score),
             WebSocketRoute("/exam", self._talk),
         ]
-        return local_application([*routes, *body_routes(lambda: session)], lifespan=lifespan)
+        return application(session, further=routes)
 
     async def _answer_score(self, request: Request) -> Response:
         past = {exam.name: exam for exam in past_examinations(self.directory)}.get(

@@ -12,7 +12,7 @@ import asyncio
 import contextlib
 import functools
 import os
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Unpack
 
@@ -38,8 +38,11 @@ from palpate.viewer.wire import Binary
 __all__ = ["Viewer", "ViewerOptions", "application", "body_routes", "serve"]
 
 
-def application(session: Session) -> Starlette:
-    """Return the web application of a session: the built page, its websocket, and the body's surface and fields."""
+def application(session: Session, *, further: Sequence[BaseRoute] = ()) -> Starlette:
+    """Return the web application of a session: the built page, its websocket, and the body's surface and fields.
+
+    Further routes go before those of the body.
+    """
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -48,7 +51,7 @@ def application(session: Session) -> Starlette:
         watcher.cancel()
         await asyncio.gather(watcher, return_exceptions=True)
 
-    return local_application(body_routes(lambda: session), lifespan=lifespan)
+    return local_application([*further, *body_routes(lambda: session)], lifespan=lifespan)
 
 
 def body_routes(session: Callable[[], Session | None]) -> list[BaseRoute]:

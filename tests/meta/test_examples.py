@@ -214,6 +214,11 @@ def in_newton(text: str, folder: Path) -> None:
     assert borne == pytest.approx(weight, rel=0.01)
 
 
+def scanned_tool(text: str, folder: Path) -> None:
+    scan, ellipsoid = (float(v) for v in re.findall(r"([\d.]+) mN", text))
+    assert scan == pytest.approx(ellipsoid, rel=0.1)  # the same but for its lumps and its flatter nail
+
+
 CHECKS: dict[str, Callable[[str, Path], None]] = {
     "01_cantilever.py": cantilever,
     "02_two_loads.py": two_loads,
@@ -231,6 +236,7 @@ CHECKS: dict[str, Callable[[str, Path], None]] = {
     "14_bent_and_stays_bent.py": bent,
     "15_touch_in_mujoco.py": in_mujoco,
     "16_touch_in_newton.py": in_newton,
+    "17_a_tool_from_a_scan.py": scanned_tool,
 }
 QUICK = {"04_filter_by_hand.py"}
 SLOW = pytest.mark.skipif(

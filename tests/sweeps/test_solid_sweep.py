@@ -97,7 +97,7 @@ def test_an_interruption_changes_no_bit(cluster, tmp_path):
 def test_a_chain_of_which_only_a_part_is_on_disk_is_solved_again(cluster, tmp_path):
     whole = sweep(Ground(), samples=16, cluster=cluster)
     ledger = Ledger(tmp_path / "a.zarr", whole.provenance["config_hash"])
-    ledger.begin()
+    ledger.begin(16)
     ledger.add(whole.take([0, 1, 2, 3, 4, 5]))
     seen = []
     data = sweep(
@@ -116,7 +116,7 @@ def test_parts_of_another_mesh_are_not_taken_up(cluster, tmp_path):
     whole = sweep(Ground(), samples=8, cluster=cluster)
     moved = Dataset(whole.data.assign_coords(rest=whole.data["rest"] + 1e-6))
     ledger = Ledger(tmp_path / "a.zarr", whole.provenance["config_hash"])
-    ledger.begin()
+    ledger.begin(8)
     ledger.add(moved)
     seen = []
     arguments = {"cluster": cluster, "path": tmp_path / "a.zarr", "samples": 8}

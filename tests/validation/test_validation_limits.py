@@ -42,8 +42,8 @@ TOUCHED = {
     "refined_force_median",
     "refined_force_p95",
 }
-# the bands and the histories have tests of their own
-BANDS = {"interval_coverage", "answer_coverage"}
+# the bands, the contrast of lumps and the histories have tests of their own
+BANDS = {"interval_coverage", "answer_coverage", "contrast_p95"}
 ONE_SIDED = [c for c in CRITERIA if c.key not in BANDS and not c.key.startswith("history")]
 
 

@@ -134,7 +134,7 @@ def test_the_score_is_that_of_the_record(taken):
     score = score_examination(past, slab())
     assert ended["stage"] == "ready"
     assert ended["notice"] == score.words == past.words
-    assert (score.found, len(score.false_alarms)) == (1, 1)
+    assert (score.hits, len(score.false_alarms)) == (1, 1)
     assert score.touch.presses
     assert score.words.replace("⌀", "") in page.text.replace("⌀", "")
 

@@ -71,7 +71,7 @@ def score():
 
 
 def test_found_missed_and_false(score):
-    assert score.found == 1
+    assert score.hits == 1
     assert [mark.number for mark in score.false_alarms] == [3]
     assert score.right("hardness") == (1, 1)
     assert score.right("depth") == (0, 1)

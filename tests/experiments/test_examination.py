@@ -57,7 +57,7 @@ def test_an_interrupted_one_goes_on_with_its_marks_lumps_and_time(tmp_path, body
         time[0] += 5.0
         again.end()
     past = PastExamination.read(exam.folder)
-    assert past.ended
+    assert past.has_end
     assert past.seconds == pytest.approx(25.0)
     with pytest.raises(UsageError, match="has ended"):
         Examination.resume(exam.folder, clocks)

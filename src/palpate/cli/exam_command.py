@@ -213,7 +213,7 @@ def _list(directory: Path, console: Console) -> None:
 
     past = past_examinations(directory)
     lines = [f"{exam.name}  {exam.words}" for exam in past]
-    rows = [{"name": exam.name, "ended": exam.ended, "words": exam.words} for exam in past]
+    rows = [{"name": exam.name, "ended": exam.has_end, "words": exam.words} for exam in past]
     console.result(
         "\n".join(lines) or f"No examination in {directory}.",
         {"folder": str(directory), "examinations": rows},
@@ -223,7 +223,7 @@ def _list(directory: Path, console: Console) -> None:
 def _print_score(past: PastExamination, console: Console) -> None:
     from palpate.experiments.exam_score import score_examination
 
-    if not past.ended:
+    if not past.has_end:
         raise UsageError(
             f"{past.name} has not ended.",
             why="Its score would tell where the lumps are.",

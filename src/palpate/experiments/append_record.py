@@ -78,7 +78,7 @@ class AppendRecord:
         return self._clocks.wall() - datetime.fromisoformat(self.events[-1]["at"]).timestamp()
 
     @property
-    def elapsed(self) -> float:
+    def seconds(self) -> float:
         """Time since the record was begun by the steady clock, without interruptions, s."""
         return self._before + self._clocks.steady() - self._began
 
@@ -87,7 +87,7 @@ class AppendRecord:
         if kind != "clock":
             self._note_jump()
         at = datetime.fromtimestamp(self._clocks.wall(), UTC).isoformat()
-        event = {"kind": kind, "at": at, "elapsed": self.elapsed} | facts
+        event = {"kind": kind, "at": at, "elapsed": self.seconds} | facts
         self._write(json.dumps(event, allow_nan=False).encode() + b"\n")
         self.events.append(event)
         return event

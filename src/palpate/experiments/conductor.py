@@ -156,7 +156,7 @@ class Conductor:
                     view["force"] = round(self._force / self._full, 3)
             if self.phase == "question":
                 view |= {
-                    "ask": self.plan.asked,
+                    "ask": self.plan.question_words,
                     "rate": [r.text for r in self.plan.rating] if self._rates else [],
                 }
             if self.phase == "break":

@@ -112,7 +112,7 @@ class PastExamination:
         return tuple(Lump((x, y, z), radius, ratio) for x, y, z, radius, ratio in self.facts["lumps"])
 
     @property
-    def ended(self) -> bool:
+    def has_end(self) -> bool:
         """True where the person has ended it; otherwise it can go on."""
         return any(event["kind"] == "ended" for event in self.events)
 
@@ -145,7 +145,7 @@ class PastExamination:
     def words(self) -> str:
         """The examination in a line."""
         said = [event["words"] for event in self.events if event["kind"] == "scored"]
-        return said[-1] if said else ("not scored" if self.ended else "interrupted")
+        return said[-1] if said else ("not scored" if self.has_end else "interrupted")
 
 
 def _number(trace: Path) -> int:

@@ -147,7 +147,7 @@ class ExamPage(LocalServer):
         past = {exam.name: exam for exam in past_examinations(self.directory)}.get(
             request.path_params["name"]
         )
-        if past is None or not past.ended:
+        if past is None or not past.has_end:
             raise HTTPException(404)
         try:
             page = await run_in_threadpool(lambda: score_page(score_examination(past)))
@@ -256,7 +256,7 @@ class ExamPage(LocalServer):
         )
         self._seed += 1
         try:
-            felt.save(exam.felt)
+            felt.save(exam.body_file)
             self._take(exam)
         except BaseException:
             exam.close()
@@ -274,8 +274,8 @@ class ExamPage(LocalServer):
             )
         exam = Examination.resume(past.folder, self._clocks)
         try:
-            if not exam.felt.is_file():  # it was killed before the body with its lumps was written
-                self._with_lumps(exam.past.lumps).save(exam.felt)
+            if not exam.body_file.is_file():  # it was killed before the body with its lumps was written
+                self._with_lumps(exam.past.lumps).save(exam.body_file)
             self._take(exam)
         except BaseException:
             exam.close()
@@ -284,7 +284,7 @@ class ExamPage(LocalServer):
 
     def _take(self, exam: Examination) -> None:
         """Put the body of an examination into the hand, and record its touch from now on."""
-        self.loop.swap(exam.felt)
+        self.loop.swap(exam.body_file)
         self.loop.start_recording(exam.past.next_trace)
         self._exam, self._score = exam, ""
 
@@ -333,11 +333,12 @@ class ExamPage(LocalServer):
             words=words,
             stage=self.stage,
             notice=self._recording_fault() or self._notice,
-            elapsed=0.0 if exam is None else exam.record.elapsed,
+            elapsed=0.0 if exam is None else exam.record.seconds,
             marks=tuple(marks),
             lumps=tuple(_exam_mark(mark, answer) for mark, answer in shown),
             former=tuple(
-                FormerExam(past.name, _when(str(past.facts["at"])), past.words, past.ended) for past in former
+                FormerExam(past.name, _when(str(past.facts["at"])), past.words, past.has_end)
+                for past in former
             ),
             score=self._score,
         )

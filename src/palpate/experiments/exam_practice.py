@@ -58,17 +58,17 @@ class Practice:
         judged = (
             f" Your {' and '.join(wrong)} is wrong." if wrong else " All right." if len(right) == 2 else ""
         )
-        return f"Found: {_described(result)}, {millimetres(round(result.off, 3))} from the mark.{judged}"
+        return f"Found: {_lump_words(result)}, {millimetres(round(result.off, 3))} from the mark.{judged}"
 
     def shown_lumps(self) -> list[tuple[Mark, str]]:
         """Return the place of the skin above each lump, as a mark of number 0, and its description."""
         shown = []
         for result in self._results:
             x, y, z = result.at.above.tolist()
-            shown.append((Mark(0, (x, y, z), result.hardness, result.depth), _described(result)))
+            shown.append((Mark(0, (x, y, z), result.hardness, result.depth), _lump_words(result)))
         return shown
 
 
-def _described(result: LumpResult) -> str:
+def _lump_words(result: LumpResult) -> str:
     under = millimetres(round(result.at.cover, 4))
     return f"a {result.hardness}, {result.depth} lump of {result.size}, {under} under the skin"

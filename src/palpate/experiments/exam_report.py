@@ -119,7 +119,7 @@ def _groups(score: ExamScore) -> list[str]:
     hidden = len(score.results)
     if not hidden:
         return []
-    rows = [("all", score.found, hidden)]
+    rows = [("all", score.hits, hidden)]
     for name in ("size", "depth", "hardness"):
         rows += [(group, *hits) for group, hits in score.by(name).items()]
     cells = []
@@ -142,7 +142,7 @@ def _pressing(score: ExamScore) -> str:
     deepest = score.surface.deepest
     rows = [
         (f"area pressed {name} (from {millimetres(round(LEVELS[name] * deepest, 4))})", f"{100 * part:.0f} %")
-        for name, part in score.covered.items()
+        for name, part in score.area_shares.items()
     ]
     presses = len(score.touch.presses)
     rows += [
@@ -183,7 +183,7 @@ def map_of(score: ExamScore) -> str:
 
     drawn = [
         f'<svg viewBox="0 0 {_WIDE:.0f} {tall:.0f}" role="img" aria-label="Map of the body">',
-        *_shaded(place(flat), surface.triangles[part], score.depths / surface.deepest),
+        *_shade(place(flat), surface.triangles[part], score.depths / surface.deepest),
         *_way(place(search_path(score.touch, surface.radius)[0] @ surface.axes.T)),
     ]
     for result in score.results:
@@ -201,7 +201,7 @@ def map_of(score: ExamScore) -> str:
     return "".join([*drawn, "</svg>"])
 
 
-def _shaded(at: np.ndarray, triangles: np.ndarray, shares: np.ndarray) -> list[str]:
+def _shade(at: np.ndarray, triangles: np.ndarray, shares: np.ndarray) -> list[str]:
     """Return the triangles of each shade as one path."""
     levels = np.digitize(shares[triangles].mean(axis=1), list(LEVELS.values()))
     paths = []

@@ -102,7 +102,7 @@ class ExamScore:
     seconds: float
 
     @property
-    def found(self) -> int:
+    def hits(self) -> int:
         """Number of lumps that were found."""
         return sum(result.mark is not None for result in self.results)
 
@@ -118,7 +118,7 @@ class ExamScore:
         return pressed_depths(self.surface, self.touch)
 
     @cached_property
-    def covered(self) -> dict[str, float]:
+    def area_shares(self) -> dict[str, float]:
         """Share of the area that was pressed to each level."""
         return self.surface.shares(self.depths)
 
@@ -141,9 +141,9 @@ class ExamScore:
     def words(self) -> str:
         """The score in a line."""
         hidden = len(self.results)
-        found = f"{self.found} of {count(hidden, 'lump')} found" if hidden else "no lump was hidden"
+        found = f"{self.hits} of {count(hidden, 'lump')} found" if hidden else "no lump was hidden"
         alarms = count(len(self.false_alarms), "false alarm")
-        covered = self.covered
+        covered = self.area_shares
         return (
             f"{found}, {alarms}, {100 * covered['lightly']:.0f} % of the area pressed, "
             f"{100 * covered['deeply']:.0f} % deeply, {duration(self.seconds)}"
@@ -155,15 +155,15 @@ class ExamScore:
         return {
             "examination": self.past.name,
             "lumps": len(self.results),
-            "found": self.found,
-            "sensitivity_interval": list(share_interval(self.found, len(self.results))),
+            "found": self.hits,
+            "sensitivity_interval": list(share_interval(self.hits, len(self.results))),
             "by_size": self.by("size"),
             "by_depth": self.by("depth"),
             "by_hardness": self.by("hardness"),
             "hardness_right": self.right("hardness"),
             "depth_right": self.right("depth"),
             "false_alarms": len(self.false_alarms),
-            "covered": self.covered,
+            "covered": self.area_shares,
             "presses": len(self.touch.presses),
             "force_p10": low,
             "force_median": middle,

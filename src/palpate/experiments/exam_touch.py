@@ -72,7 +72,7 @@ class ExamSurface:
         points = np.asarray(surface.rest, float).reshape(-1, 3)
         triangles = np.asarray(surface.triangles, np.int64).reshape(-1, 3)
         touchable = np.asarray(surface.touchable) > 0
-        points, fine = _refined(points, triangles[touchable], _FINE * body.radius)
+        points, fine = _cut_finely(points, triangles[touchable], _FINE * body.radius)
         reachable = np.zeros(len(points), bool)
         touched = np.unique(fine)
         if body.surface is not None and len(touched):
@@ -124,7 +124,7 @@ class ExamSurface:
         return {name: float(area / whole) if whole > 0 else 0.0 for name, area in pressed.items()}
 
 
-def _refined(points: np.ndarray, triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
+def _cut_finely(points: np.ndarray, triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
     """Return points, the old ones first, and triangles cut into four until no edge is longer than `longest`, m."""
     for _ in range(_MOST_CUTS):
         edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -188,7 +188,7 @@ class ExamTouch:
         """Time in which the probe touched, s."""
         return sum(press.seconds for press in self.presses)
 
-    def thinned(self) -> np.ndarray:
+    def path_ticks(self) -> np.ndarray:
         """Return the indices of ticks in contact, one in 20 ms."""
         touching = np.flatnonzero(self.contact)
         if not len(touching):
@@ -251,7 +251,7 @@ def pressed_depths(surface: ExamSurface, touch: ExamTouch) -> np.ndarray:
     from scipy.spatial import cKDTree
 
     depths = np.zeros(len(surface.points))
-    ticks = touch.thinned()
+    ticks = touch.path_ticks()
     if not len(ticks):
         return depths
     reach = np.sqrt(2.0 * surface.radius * touch.depth[ticks])
@@ -291,7 +291,7 @@ class SearchOrder:
 def search_path(touch: ExamTouch, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the places (k, 3) of a search, m, half a radius apart or more, and the time (k,) of each, s."""
     kept: list[int] = []
-    for tick in touch.thinned():
+    for tick in touch.path_ticks():
         if not kept or np.linalg.norm(touch.place[tick] - touch.place[kept[-1]]) >= _STEP * radius:
             kept.append(int(tick))
     return touch.place[kept].reshape(-1, 3), touch.time[kept]

@@ -75,7 +75,7 @@ class Examination:
     def resume(cls, folder: Path, clocks: Clocks | None = None) -> Self:
         """Go on with an examination that was interrupted."""
         exam = cls(folder, clocks)
-        if exam.past.ended:
+        if exam.past.has_end:
             exam.close()
             raise UsageError(
                 f"{folder.name} has ended.", why="Its score is known.", fix="Begin a new examination."
@@ -89,7 +89,7 @@ class Examination:
         return PastExamination(self.folder, tuple(self.record.events))
 
     @property
-    def felt(self) -> Path:
+    def body_file(self) -> Path:
         """The file of the body with its lumps, which the hand feels."""
         return self.folder / FELT
 

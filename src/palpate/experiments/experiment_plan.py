@@ -250,7 +250,7 @@ class Plan(Record):
         return Population(self.observer(), self.expect.location_between, self.expect.spread_between)
 
     @property
-    def asked(self) -> str:
+    def question_words(self) -> str:
         """The question after each trial."""
         usual = {
             "discrimination": "Which one was stiffer?",

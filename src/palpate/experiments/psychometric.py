@@ -234,7 +234,7 @@ class Psychometric:
         quantiles = [_quantiles(axes[k], m, tails) for k, m in marginals.items()]
         for person in np.flatnonzero(_steps(marginals) < _COARSE):
             own = Answers(answers.level, answers.order, answers.yes[[person]], answers.total[[person]])
-            finer, values, best[person] = self._refined(
+            finer, values, best[person] = self._refine(
                 own, axes, {k: m[[person]] for k, m in marginals.items()}
             )
             for place, k in enumerate(marginals):
@@ -261,7 +261,7 @@ class Psychometric:
         joined = (np.concatenate(column) for column in zip(*parts, strict=True))
         return dict(zip(_SHOWN, joined, strict=True)), best
 
-    def _refined(
+    def _refine(
         self, own: Answers, axes: _Axes, marginals: dict[int, np.ndarray]
     ) -> tuple[_Axes, dict[int, np.ndarray], np.ndarray]:
         """Return a grid about one person's posterior, that posterior, and the most likely values (5,)."""

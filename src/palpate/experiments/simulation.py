@@ -125,8 +125,8 @@ def simulate_course(
     return Simulated(
         people=people,
         trials=course.total,
-        location_coverage=_covered(estimate.location, observer.location),
-        spread_coverage=_covered(estimate.spread, truth),
+        location_coverage=_coverage(estimate.location, observer.location),
+        spread_coverage=_coverage(estimate.spread, truth),
         location_bias=float((estimate.location[:, 1] - observer.location).mean()),
         bias=float(np.expm1(off.mean())),
         scatter=float(off.std()),
@@ -136,7 +136,7 @@ def simulate_course(
     )
 
 
-def _covered(interval: np.ndarray, truth: float) -> float:
+def _coverage(interval: np.ndarray, truth: float) -> float:
     return float(((interval[:, 0] <= truth) & (truth <= interval[:, 2])).mean())
 
 

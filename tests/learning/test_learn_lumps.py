@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from palpate.learning.lumps.learn_lumps import _curvature, change_errors
 from palpate.surrogates.lumps import LumpRoom
 from palpate.surrogates.lumps.lump_contrast import closed_form
 from palpate.units import Range
+from palpate.validation.figures.contrast_error import contrast_error
 
 RADIUS, K = 0.008, 0.14
 ROOM = LumpRoom(
@@ -68,6 +71,18 @@ def test_its_own_error_is_about_that_of_unseen_lumps(learnt):
     unseen = np.median(change_errors(learnt, _presses(30, 6, seed=1)))
     assert 0.3 * unseen < own["median"] < 5 * unseen
     assert learnt.meta["presses"] == 28
+
+
+def test_the_figure_is_of_the_presses_whose_force_a_lump_changes_by_a_hundredth(learnt, monkeypatch):
+    presses = _presses(30, 6, seed=1)
+    monkeypatch.setattr(LumpPresses, "of", lambda data: presses)
+    subject = SimpleNamespace(lumps=learnt, data={"lump_energy": None})
+    figure = contrast_error(subject)
+    errors = change_errors(learnt, presses.take(presses.contrast_rows))
+    assert figure.count == len(errors)
+    assert figure.measured() == {"contrast_p95": (pytest.approx(np.quantile(errors, 0.95)), None)}
+    monkeypatch.setattr(LumpPresses, "of", lambda data: presses.take(presses.contrast_rows[:7]))
+    assert "takes 8 unseen presses" in contrast_error(subject)
 
 
 def test_the_constant_of_the_closed_form_is_found(learnt):

@@ -8,13 +8,11 @@ import numpy as np
 
 from palpate.format import share
 from palpate.learning.lumps import LumpPresses
-from palpate.learning.lumps.learn_lumps import change_errors
+from palpate.learning.lumps.learn_lumps import FEWEST, change_errors
 from palpate.validation.figures.figure import Figure, Measured
 from palpate.validation.subject import Subject
 
 __all__ = ["ContrastError", "contrast_error"]
-
-FEWEST = 8  # presses with a lump, below which their 95th percentile is the largest
 
 
 @dataclass(frozen=True)

@@ -74,8 +74,13 @@ def nodes_of(mesh: BodyMesh, triangles: np.ndarray) -> np.ndarray:
     return np.union1d(triangles, [middle[tuple(pair)] for pair in sides.tolist()])
 
 
-def deck(mesh: BodyMesh, law: str, fixed: np.ndarray, moved: np.ndarray, steps, *, large: bool) -> str:
-    """Input for CalculiX: nodes `fixed` held in all components, nodes `moved` (both counted from 0) displaced."""
+def deck(
+    mesh: BodyMesh, law: str, fixed: np.ndarray, moved: np.ndarray, steps, *, large: bool, other=None
+) -> str:
+    """Input for CalculiX: nodes `fixed` held in all components, nodes `moved` (both counted from 0) displaced.
+
+    `other` has elements (e,) of another law, counted from 0, and that law.
+    """
     points, tetrahedra = second_order(mesh)
     lines = ["*NODE, NSET=ALL"]
     lines += [f"{i}, {x!r}, {y!r}, {z!r}" for i, (x, y, z) in enumerate((points / MILLI).tolist(), 1)]
@@ -83,7 +88,12 @@ def deck(mesh: BodyMesh, law: str, fixed: np.ndarray, moved: np.ndarray, steps, 
     lines += [", ".join(map(str, [i, *row])) for i, row in enumerate((tetrahedra + 1).tolist(), 1)]
     for name, nodes in (("FIXED", fixed), ("MOVED", moved)):
         lines += [f"*NSET, NSET={name}", *(f"{node + 1}," for node in nodes.tolist())]
-    lines += ["*MATERIAL, NAME=LAW", law, "*SOLID SECTION, ELSET=BODY, MATERIAL=LAW"]
+    elements, second = ([], "") if other is None else other
+    rest = np.setdiff1d(np.arange(len(tetrahedra)), elements)
+    for name, rows, own in (("REST", rest, law), ("OTHER", elements, second)):
+        if len(rows):
+            lines += [f"*ELSET, ELSET={name}", *(f"{row + 1}," for row in rows)]
+            lines += [f"*MATERIAL, NAME=L{name}", own, f"*SOLID SECTION, ELSET={name}, MATERIAL=L{name}"]
     lines += ["*BOUNDARY", "FIXED, 1, 3"]
     for step in steps:
         lines += _step(step, large)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import calculix
 import numpy as np
 import pytest
 
 import palpate as pp
+from palpate.physics.interactions import PrescribedDisplacement
 from palpate.physics.shapes.block import name_upright_faces
 from palpate.physics.shapes.naming import INTERFACE
 from palpate.physics.shapes.shape import Solid
@@ -79,3 +81,55 @@ def test_a_lump_changes_the_force_as_a_sharp_ball_does():
     assert np.linalg.norm(change) > 0.01 * force
     assert np.linalg.norm(change - fine[1]) < 0.10 * np.linalg.norm(fine[1])
     assert np.linalg.norm(free.response + change - fine[0] - fine[1]) < 0.01 * force
+
+
+@pytest.mark.full
+@pytest.mark.timeout(400)
+def test_a_lump_changes_the_force_on_a_patch_as_a_ball_of_other_elements_in_calculix(ccx, tmp_path):
+    """The patch goes down by a tenth of the height; in CalculiX the ball is elements of five times the modulus.
+
+    Its straight-sided elements have a little less than the ball's volume: the field has the radius of that volume.
+    """
+    soft = pp.materials.NeoHookean(young=9e3, poisson=0.45, form="isochoric")
+    patch = ((0.014, 0.014, SIZE[2]), (0.026, 0.026, SIZE[2]))
+    push = PrescribedDisplacement(
+        "top", ("x", "z"), ((-0.01, 0.01), (-0.01, 0.01)), within=patch, element=0.004
+    )
+    mesh = pp.Body(Nodule(), dict.fromkeys(Nodule.regions, soft), fixed="bottom").problem(push).mesh
+    triangles = mesh.triangles_of("top")
+    low, high = np.array(patch[0]) - 1e-7, np.array(patch[1]) + 1e-7
+    corners = mesh.points[triangles]
+    moved = calculix.nodes_of(mesh, triangles[((corners >= low) & (corners <= high)).all(axis=(1, 2))])
+    fixed, step = calculix.nodes_of(mesh, mesh.triangles_of("bottom")), calculix.Step((0.0, 0.0, -0.003))
+    ball = np.flatnonzero(mesh.region_of == mesh.regions.index("lump"))
+    stiff = replace(soft, young=LUMP.ratio * soft.young)
+    free, hard = (
+        calculix.run(
+            ccx,
+            tmp_path,
+            calculix.deck(
+                mesh,
+                calculix.neo_hookean(soft),
+                fixed,
+                moved,
+                [step],
+                large=True,
+                other=(ball, calculix.neo_hookean(law)),
+            ),
+        )[0].force[2]
+        for law in (soft, stiff)
+    )
+    edges = np.diff(mesh.points[mesh.tetrahedra[ball]], axis=1)
+    radius = float(np.cbrt(np.abs(np.linalg.det(edges)).sum() / 6 * 3 / (4 * np.pi)))
+    assert 0.97 * LUMP.radius < radius < LUMP.radius
+    around = pp.physics.FineMesh("inside", 0.0036, (0.011, 0.011, 0.008), (0.029, 0.029, 0.026))
+    block = pp.shapes.Block(size=SIZE, element=ELEMENT)
+    laws = (soft, pp.materials.Lumped.of(soft, replace(LUMP, radius=radius)))
+    problems = [pp.Body(block, law, fixed="bottom").problem(push) for law in laws]
+    plain, lumped = (
+        -replace(problem, fine=(*problem.refinements, around)).solve((0.0, -0.003)).response[1]
+        for problem in problems
+    )
+    assert abs(hard - free) > 0.01 * abs(free)
+    assert lumped - plain == pytest.approx(hard - free, rel=0.10)
+    assert lumped == pytest.approx(hard, rel=0.015)

@@ -221,14 +221,17 @@ def run_one(
 
 @experiment_app.command("analyse")
 def analyse_folder(plan: PlanFile, as_json: Json = False) -> None:
-    """Analyse all sittings of a plan: each person's function, the group, and equivalence."""
+    """Analyse all sittings of a plan: each person's function, the group, equivalence, and a picture of them."""
     from palpate.experiments.analysis import analyse
+    from palpate.experiments.analysis_picture import save_pictures
     from palpate.experiments.study_folder import StudyFolder
 
     folder = StudyFolder.beside(plan)
     folder.require_plan(plan)
     analysis = analyse(folder)
-    Console(as_json).result(str(analysis), analysis.as_dict())
+    pictures = [str(path) for path in save_pictures(analysis, folder.root / "derivatives")]
+    drawn = "".join(f"\n{path}" for path in pictures)
+    Console(as_json).result(f"{analysis}{drawn}", analysis.as_dict() | {"pictures": pictures})
 
 
 @experiment_app.command()

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import re
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Error, sync_playwright
+from playwright.sync_api import sync_playwright
+from scripted_participant import Sitting, shortened
 
 from palpate.devices.doubles.haply_simulator import HaplySimulator, SimulatorSettings
 from palpate.devices.trace_file import read_trace
@@ -37,104 +35,9 @@ def browser(chromium):
 @pytest.fixture
 def plan(tmp_path):
     surrogate().save(tmp_path / "body.palpate")
-    text = ready_plan("discrimination", "live", ["body.palpate"])
-    for before, after in (
-        ("trials = 80", "trials = 4"),
-        ("practice = 4", "practice = 1"),
-        ("catch = 4", "catch = 1"),
-        ("break_every = 40", "break_every = 3"),
-        ("break_seconds = 60", "break_seconds = 1"),
-        ("interval_seconds = 3.0", "interval_seconds = 0.3"),
-    ):
-        text = text.replace(before, after)
+    text = shortened(ready_plan("discrimination", "live", ["body.palpate"]), 4)
     (tmp_path / "live.toml").write_text(text, "utf-8")
     return tmp_path / "live.toml"
-
-
-class Sitting:
-    """`palpate experiment run` in a process of its own, and its two pages in a browser."""
-
-    def __init__(self, browser, plan: Path, *options: str) -> None:
-        command = [sys.executable, "-m", "palpate", "experiment", "run", plan.name, "sub-01", "--no-browser"]
-        self.process = subprocess.Popen(
-            [*command, "--port", "0", *options], cwd=plan.parent, stderr=subprocess.PIPE, text=True
-        )
-        urls, said = {}, []
-        for line in self.process.stderr:
-            said.append(line)
-            if known := re.match(r"(participant|control): +(http\S+)", line):
-                urls[known[1]] = known[2]
-            if len(urls) == 2:
-                break
-        assert len(urls) == 2, "".join(said)
-        self.complaints = []
-        self.page, self.control = (self._open(browser, urls[name]) for name in ("participant", "control"))
-
-    def _open(self, browser, url):
-        page = browser.new_context(viewport={"width": 390, "height": 780}).new_page()
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.goto(url)
-        page.wait_for_selector("html[data-phase]")
-        return page
-
-    @property
-    def phase(self) -> str:
-        return self.page.evaluate("document.documentElement.dataset.phase")
-
-    def act(self, trials: int, *, press: bool) -> None:
-        """Answer so many trials, then stop in the middle of a touch; at the end of the sitting, at once."""
-        answered, until = 0, time.monotonic() + 200.0
-        while time.monotonic() < until:
-            phase = self.phase
-            if phase == "consent":
-                self._click("#agree")
-            elif phase == "ready":
-                self._click("#go")
-            elif phase == "touch":
-                if press:
-                    self._press()
-                if answered == trials:
-                    time.sleep(0.2)
-                    return
-                with contextlib.suppress(
-                    Error
-                ):  # on a busy machine a press may come too late: it is tried again
-                    self._leave("touch", 5_000)
-                self.page.mouse.up()
-            elif phase == "question":
-                self.page.keyboard.press("2")
-                self._leave("question")
-                answered += 1
-            elif phase == "done":
-                return
-            time.sleep(0.02)
-        raise AssertionError(f"still {self.phase} after {answered} answers")
-
-    def _click(self, what: str) -> None:
-        with contextlib.suppress(Error):  # the phase has changed meanwhile
-            self.page.click(what, timeout=300)
-
-    def _press(self) -> None:
-        box = self.page.locator("#pad").bounding_box()
-        if box is None:
-            return
-        x, y = box["x"] + box["width"] / 2, box["y"] + 20
-        self.page.mouse.move(x, y)
-        self.page.mouse.down()
-        self.page.mouse.move(x, y + 0.4 * box["height"], steps=4)
-
-    def _leave(self, phase: str, most: float = 60_000) -> None:
-        self.page.wait_for_selector(f"html:not([data-phase={phase}])", timeout=most)
-
-    def end(self, *, kill: bool = False) -> int:
-        if kill:
-            self.process.kill()
-        code = self.process.wait(60)
-        self.process.stderr.close()
-        for page in (self.page, self.control):
-            page.context.close()
-        assert self.complaints == []
-        return code
 
 
 def assert_replayable(folder: Path, rows: list[dict[str, str]]) -> None:
@@ -181,3 +84,37 @@ def test_a_killed_sitting_goes_on_and_every_touch_can_be_replayed(device, browse
     )  # fmt: skip
     assert again.returncode == 2
     assert "has finished run 1" in again.stderr
+
+
+@pytest.mark.parametrize("kind", ["detection", "rating"])
+def test_detection_and_ratings_go_on_after_a_kill(kind, browser, tmp_path):
+    surrogate().save(tmp_path / "body.palpate")
+    surrogate(factor=1.2).save(tmp_path / "other.palpate")
+    text = shortened(ready_plan(kind, "live", ["body.palpate", "other.palpate"]), 3, catch=0)
+    lump = {"high = 0.012": "high = 0.006", "[0.0, 0.0, -0.02]": "[0.0, 0.0, -0.009]"}
+    for before, after in lump.items():
+        text = text.replace(before, after)
+    (tmp_path / "live.toml").write_text(text, "utf-8")
+    total = 1 + 3 * (2 if kind == "rating" else 1)  # ratings are of the reference, too
+
+    first = Sitting(browser, tmp_path / "live.toml")
+    first.act(2, press=True)
+    first.end(kill=True)
+    (table,) = (tmp_path / "live" / "sub-01" / "beh").glob("*_events.tsv")
+    before = table.read_bytes()
+    second = Sitting(browser, tmp_path / "live.toml")
+    second.act(total, press=True, answer=lambda felt: max(felt, key=felt.get))
+    assert second.end() == 0
+
+    rows = read_table(table)
+    assert table.read_bytes().startswith(before)
+    assert [int(row["trial"]) for row in rows] == list(range(1, total + 1))
+    assert [row["part"] for row in rows] == ["1"] * 2 + ["2"] * (total - 2)
+    assert_replayable(table.parent, rows[:1] + rows[-1:])
+    if kind == "rating":
+        names = ("stiffness", "smoothness", "resemblance", "confidence")
+        assert {tuple(row[name] for name in names) for row in rows} == {("3", "4", "5", "6")}
+        assert {row["condition"] for row in rows[1:]} == {"reference", "body1"}
+    else:
+        assert {row["condition"] for row in rows} == {"body1"}
+        assert all(0.003 <= float(row["value"]) <= 0.006 for row in rows)

@@ -11,6 +11,7 @@ import pytest
 from palpate.cli.experiment_commands import write_plan as write_the_plan
 from palpate.errors import FileFormatError, StudyError, UsageError
 from palpate.experiments import analyse, read_plan
+from palpate.experiments.analysis_picture import save_pictures
 from palpate.experiments.ready_plans import KINDS, ready_plan
 from palpate.experiments.sitting import Sitting
 from palpate.experiments.study_folder import Participant, StudyFolder, read_table
@@ -159,6 +160,11 @@ def test_analysis_finds_each_person_and_the_group(folder):
     assert group.log_spread.low < np.log(0.6745 * 0.2) < group.log_spread.high
     json.dumps(result.as_dict())
     assert "Weber fraction" in str(result)
+    for person in result.people:
+        assert sum(count for _, _, count in person.points) == 80
+    svg, png = save_pictures(result, folder.root / "derivatives")
+    assert "sub-02" in svg.read_text("utf-8")
+    assert png.stat().st_size > 10_000
 
 
 def test_a_line_that_a_kill_cut_off_is_left_out(folder):
@@ -229,3 +235,29 @@ def test_each_column_has_a_meaning(folder):
     described = json.loads((folder.root / "task-trial_events.json").read_text("utf-8"))
     assert header == list(described)
     assert all(described[name]["Description"] for name in header)
+
+
+def test_experts_rate_apart_from_others(tmp_path):
+    """Each kind of expertise has quartiles and odds of its own; what is rated two higher has odds above one."""
+    file = write_plan(tmp_path, "rating")
+    folder = StudyFolder.beside(file)
+    folder.prepare(file)
+    rng = np.random.default_rng(2)
+    for k in range(1, 7):
+        who = Participant(f"{k:02d}", expertise="surgeon" if k % 2 else "student")
+        folder.enrol(who)
+        files, sitting = folder.sitting(who, 1), Sitting(folder.plan, who.label)
+        while (trial := sitting.next()) is not None:
+            row = {"trial": trial.number, "kind": trial.kind, "condition": trial.condition, "part": 1}
+            middle = 3 + 2 * (trial.condition != "reference") * (k % 2)
+            files.append(row | {r.name: middle + int(rng.integers(-1, 2)) for r in folder.plan.rating})
+            sitting.answer(1)
+    result = analyse(folder)
+    json.dumps(result.as_dict())
+    odds = {
+        r.expertise: r.odds for r in result.ratings if r.statement == "stiffness" and r.condition == "body1"
+    }
+    assert odds["surgeon"][0] > 1.0
+    assert odds["student"][0] < 1.0 < odds["student"][2]
+    assert {r.people for r in result.ratings} == {3}
+    assert "odds of a higher rating" in str(result)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from palpate.experiments.exam_page import ExamPage
     from palpate.surrogates import Lump, Surrogate
 
-__all__ = ["exam"]
+__all__ = ["exam", "learnt_study"]
 
 
 def exam(
@@ -138,7 +138,7 @@ def _body(what: str) -> tuple[ExamKind, Surrogate]:
         return KINDS[what], shipped_body(what)
     path = Path(what)
     if path.suffix == ".toml":
-        path = _learnt_study(path)
+        path = learnt_study(path)
     elif path.suffix != ".palpate":
         checks.one_of("What is examined", what, tuple(KINDS))
     surrogate = load_surrogate(path)
@@ -161,7 +161,7 @@ def _there() -> str:
     return f"or examine {' or '.join(names)}." if names else "or examine a body of your own."
 
 
-def _learnt_study(path: Path) -> Path:
+def learnt_study(path: Path) -> Path:
     """Return the model file of a study."""
     from palpate.study import read_study
     from palpate.study.study_paths import Paths

@@ -30,6 +30,7 @@ experiment_app = typer.Typer(
 
 PlanFile = Annotated[Path, typer.Argument(help="Plan, as [bold]palpate experiment plan[/] writes it.")]
 Who = Annotated[str, typer.Argument(help="Label of the participant, such as sub-01; never a name.")]
+_FEWEST = 6  # solves from which a body is learnt
 SIMULATED = "Everything here was tried on simulated observers only, never on people."
 
 
@@ -37,7 +38,10 @@ SIMULATED = "Everything here was tried on simulated observers only, never on peo
 def write_plan(
     bodies: Annotated[
         list[Path] | None,
-        typer.Argument(help="Model files (.palpate) of the bodies, the reference first."),
+        typer.Argument(
+            help="Model files (.palpate) of the bodies, the reference first; of full-model also a study that is "
+            "learnt, whose presses are then solved."
+        ),
     ] = None,
     kind: Annotated[
         str,
@@ -54,19 +58,60 @@ def write_plan(
     from palpate.files import write_file
 
     file = out or Path(f"{name}.toml")
-    files = [_path_from(file.parent, body) for body in bodies or ()]
-    text = ready_plan(kind, name, files or ["body.palpate", "other.palpate"])
-    if show:
-        typer.echo(text)
-        return
-    if file.exists():
+    if file.exists() and not show:
         raise UsageError(
             f"{file} is there already.",
             why="A plan is never overwritten.",
             fix="Give another --name or --out.",
         )
+    notes = dict[Path, str]()
+    if kind == "full-model" and bodies and len(bodies) == 1 and bodies[0].suffix == ".toml" and not show:
+        ready_plan(kind, name, ["body.palpate", "other.palpate"])  # a wrong name is refused before the solves
+        notes = _solve_full_model(bodies[0], Console())
+    files = [_path_from(file.parent, body) for body in notes or bodies or ()]
+    text = ready_plan(kind, name, files or ["body.palpate", "other.palpate"], tuple(notes.values()))
+    if show:
+        typer.echo(text)
+        return
     write_file(file, text)
     Console().result(f"{file}: edit it, then `palpate experiment simulate {file}`.", {})
+
+
+def _solve_full_model(path: Path, console: Console) -> dict[Path, str]:
+    """Return the bodies of a study's full model, of few of its solves and of all, each with its force error in words.
+
+    The full model takes part by presses that are solved now; `few` is learnt from an eighth of the study's solves.
+    """
+    import numpy as np
+
+    from palpate.cli.exam_command import learnt_study
+    from palpate.experiments.recorded_presses import body_of_presses, line_errors, solve_presses
+    from palpate.learning.loading import load_surrogate
+    from palpate.runtime.touchable import touchable
+    from palpate.study import read_study
+    from palpate.study.run import learn_study, load_data
+    from palpate.study.study_paths import Paths
+
+    model = learnt_study(path)
+    study = read_study(path)
+    whole, (train, _) = load_surrogate(model), load_data(study, Paths(path.parent, study.name))
+    stem = path.parent / study.name
+    console.say("The presses of the full model are solved …")
+    store = Path(f"{stem}-presses.zarr")
+    presses, unseen = solve_presses(study.problem(whole=True), touchable(whole), store)
+    reference = body_of_presses(presses, unseen, f"{study.name}, full model", console.say)
+    count = max(_FEWEST, len(train) // 8)
+    few, _ = learn_study(study, train.take(np.arange(min(count, len(train)))), log=console.say)
+    files = {"presses": reference, f"{count}-solves": few, "": whole}
+    named = {Path(f"{stem}-{end}.palpate") if end else model: body for end, body in files.items()}
+    for file, body in named.items():
+        if file != model:
+            body.save(file)
+    errors = line_errors({str(file): body for file, body in named.items()}, unseen)
+    return {
+        file: f"along the line its force is off by {mean:.2%} on average, {most:.2%} at most"
+        for file, (mean, most) in zip(named, errors.values(), strict=True)
+    }
 
 
 def _path_from(folder: Path, body: Path) -> str:
@@ -176,14 +221,17 @@ def run_one(
 
 @experiment_app.command("analyse")
 def analyse_folder(plan: PlanFile, as_json: Json = False) -> None:
-    """Analyse all sittings of a plan: each person's function, the group, and equivalence."""
+    """Analyse all sittings of a plan: each person's function, the group, equivalence, and a picture of them."""
     from palpate.experiments.analysis import analyse
+    from palpate.experiments.analysis_picture import save_pictures
     from palpate.experiments.study_folder import StudyFolder
 
     folder = StudyFolder.beside(plan)
     folder.require_plan(plan)
     analysis = analyse(folder)
-    Console(as_json).result(str(analysis), analysis.as_dict())
+    pictures = [str(path) for path in save_pictures(analysis, folder.root / "derivatives")]
+    drawn = "".join(f"\n{path}" for path in pictures)
+    Console(as_json).result(f"{analysis}{drawn}", analysis.as_dict() | {"pictures": pictures})
 
 
 @experiment_app.command()

@@ -12,7 +12,8 @@ from palpate.errors import UsageError
 from palpate.experiments.experiment_plan import Plan
 from palpate.experiments.groups import Equivalence, GroupMean, deviation_of, equivalence, group_mean
 from palpate.experiments.psychometric import Answers
-from palpate.experiments.study_folder import StudyFolder, read_table
+from palpate.experiments.ratings import RatingResult, rate
+from palpate.experiments.study_folder import MISSING, StudyFolder, read_table
 
 __all__ = ["Analysis", "GroupResult", "PersonResult", "analyse"]
 
@@ -35,6 +36,9 @@ class PersonResult:
     deviance: float
     p: float  # share of repetitions from the fitted function whose deviance is larger
     notes: tuple[str, ...]  # a sentence on each thing that makes the estimate doubtful
+    points: tuple[
+        tuple[float, float, int], ...
+    ]  # level, share of the answers that p counts, number of answers
 
 
 @dataclass(frozen=True)
@@ -59,8 +63,8 @@ class Analysis:
         Results of each person in each condition.
     groups : tuple of GroupResult
         Results of each condition with two people or more.
-    ratings : dict
-        By condition and statement: median, quartiles, people, and p against the reference.
+    ratings : tuple of RatingResult
+        By statement, condition and expertise: quartiles, people, and the odds of a higher rating than the reference's.
     left_out : tuple of str
         A sentence on each sitting or person that does not count.
     """
@@ -68,25 +72,17 @@ class Analysis:
     plan: Plan
     people: tuple[PersonResult, ...]
     groups: tuple[GroupResult, ...]
-    ratings: dict[str, dict[str, dict[str, Any]]]
+    ratings: tuple[RatingResult, ...]
     left_out: tuple[str, ...]
 
     def __str__(self) -> str:
-        lines = [
-            f"{self.plan.name}: {self.plan.question}, {len({p.participant for p in self.people})} people"
-        ]
+        count = len({p.participant for p in self.people})
+        lines = [f"{self.plan.name}: {self.plan.question}" + (f", {count} people" if count else "")]
         lines += [f"  left out   {text}" for text in self.left_out]
         lines += [line for person in self.people for line in self._of_person(person)]
         for group in self.groups:
             lines += self._of_group(group)
-        for condition, items in self.ratings.items():
-            for item, r in items.items():
-                beside = "" if r["p"] is None else f", against the reference p = {r['p']:.3g}"
-                lines.append(
-                    f"  {condition:12} {item:14} median {r['median']:g}, quartiles {r['low']:g} … {r['high']:g}, "
-                    f"{r['people']} people{beside}"
-                )
-        return "\n".join(lines)
+        return "\n".join(lines + [str(r) for r in self.ratings])
 
     def _shown(self, interval: tuple[float, float, float]) -> str:
         """Return a median with its interval, in what the plan varies."""
@@ -134,7 +130,7 @@ class Analysis:
                 }
                 for g in self.groups
             ],
-            "ratings": self.ratings,
+            "ratings": [vars(r) for r in self.ratings],
             "left_out": list(self.left_out),
         }
 
@@ -158,7 +154,7 @@ def analyse(folder: StudyFolder) -> Analysis:
         )
     plan = folder.plan
     if plan.question == "rating":
-        return Analysis(plan, (), (), _ratings(plan, rows), ())
+        return Analysis(plan, (), (), tuple(_ratings(folder, rows)), ())
     people, left_out = list[PersonResult](), list[str]()
     for (label, condition), own in sorted(rows.items()):
         counted = [r for r in own if r["kind"] == "trial"]
@@ -166,7 +162,7 @@ def analyse(folder: StudyFolder) -> Analysis:
             left_out.append(f"{label} {condition}: {len(counted)} answers, {_FEW} are needed")
             continue
         people.append(_person(plan, label, condition, own, counted))
-    return Analysis(plan, tuple(people), _groups(plan, people), {}, tuple(left_out))
+    return Analysis(plan, tuple(people), _groups(plan, people), (), tuple(left_out))
 
 
 def _person(
@@ -194,11 +190,13 @@ def _person(
         notes.append(f"the limit of force acted in {hit} trials")
     if jumps := sum(r["clock_jump"] != "0" for r in rows):
         notes.append(f"the machine's clock jumped in {jumps} trials; times are steady")
+    count = np.bincount(index)
+    points = zip(levels.tolist(), (np.bincount(index, yes) / count).tolist(), count.tolist(), strict=True)
     low, middle, high = estimate.location[0].tolist()
     s_low, s_middle, s_high = estimate.spread[0].tolist()
     return PersonResult(
         label, condition, len(x), (low, middle, high), (s_low, s_middle, s_high),
-        float(estimate.lapse[0, 1]), good.deviance, good.p, tuple(notes),
+        float(estimate.lapse[0, 1]), good.deviance, good.p, tuple(notes), tuple(points),
     )  # fmt: skip
 
 
@@ -222,31 +220,15 @@ def _groups(plan: Plan, people: list[PersonResult]) -> tuple[GroupResult, ...]:
     return tuple(groups)
 
 
-def _ratings(
-    plan: Plan, rows: dict[tuple[str, str], list[dict[str, str]]]
-) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return median and quartiles over people's own medians, with Wilcoxon's signed-rank test against the reference."""
-    from scipy.stats import wilcoxon
-
-    medians = defaultdict[tuple[str, str], dict[str, float]](dict)
-    for (label, condition), own in rows.items():
-        counted = [r for r in own if r["kind"] == "trial"]
-        for rating in plan.rating:
-            if counted:
-                answers = [int(r[rating.name]) for r in counted]
-                medians[condition, rating.name][label] = float(np.median(answers))
-    results = defaultdict[str, dict[str, dict[str, Any]]](dict)
-    for (condition, item), own_medians in sorted(medians.items()):
-        values = np.array(list(own_medians.values()))
-        beside = medians.get(("reference", item), {})
-        both = [own_medians[k] - beside[k] for k in own_medians if k in beside]
-        tested = condition != "reference" and len(both) > 1 and any(both)
-        low, middle, high = np.quantile(values, [0.25, 0.5, 0.75]).tolist()
-        results[condition][item] = {
-            "median": middle,
-            "low": low,
-            "high": high,
-            "people": len(values),
-            "p": float(wilcoxon(both).pvalue) if tested else None,
+def _ratings(folder: StudyFolder, rows: dict[tuple[str, str], list[dict[str, str]]]) -> list[RatingResult]:
+    people = folder.root / "participants.tsv"
+    own = {row["participant_id"]: row["expertise"] for row in read_table(people)} if people.exists() else {}
+    expertise = {label: own.get(label, MISSING) for label, _ in rows}
+    results = []
+    for rating in folder.plan.rating:
+        answers = {
+            key: [int(r[rating.name]) for r in table if r["kind"] == "trial"] for key, table in rows.items()
         }
-    return dict(results)
+        counted = {key: values for key, values in answers.items() if values}
+        results += rate(counted, rating.name, expertise) if counted else []
+    return results

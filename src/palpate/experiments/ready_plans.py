@@ -97,11 +97,11 @@ KINDS = {
 """Kinds of plans, and what each asks."""
 
 
-def ready_plan(kind: str, name: str, bodies: Sequence[str | Path]) -> str:
+def ready_plan(kind: str, name: str, bodies: Sequence[str | Path], notes: Sequence[str] = ()) -> str:
     """Return the text of a plan of a kind of `KINDS`, with the experiment's name in letters and digits.
 
-    `bodies` are files of learnt bodies, the reference first; of discrimination one is enough. An unknown kind, a name
-    with other signs, or a file too few, is a UsageError.
+    `bodies` are files of learnt bodies, the reference first; of discrimination one is enough. `notes` become comments
+    beside them. An unknown kind, a name with other signs, or a file too few, is a UsageError.
     """
     kind = checks.one_of("The kind of plan", kind, tuple(KINDS))
     if not re.fullmatch("[A-Za-z0-9]+", name):
@@ -126,9 +126,11 @@ def ready_plan(kind: str, name: str, bodies: Sequence[str | Path]) -> str:
     text = _HEAD.format(
         name=name, question=question, reference=json.dumps(files[0]), minutes=45, max_force=3.0
     )
+    beside = [f"# {note}\n" for note in notes] or [""] * len(files)
+    text += beside[0]
     for number, file in enumerate(files[1:], 1):
         label = "same" if file == files[0] else f"body{number}"
-        text += f"\n[[comparison]]\nname = {json.dumps(label)}\nfile = {json.dumps(file)}\n"
+        text += f"\n[[comparison]]\nname = {json.dumps(label)}\nfile = {json.dumps(file)}\n{beside[number]}"
     if not rating:
         text += _vary(kind)
     trials, spread = (10, 0.2) if rating else (80, 0.4 if kind in {"odd-one-out", "detection"} else 0.2)

@@ -1,0 +1,131 @@
+"""A participant by script: Chromium in the place of a person, on the two pages of `palpate experiment run`."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from playwright.sync_api import Error
+
+__all__ = ["Sitting", "shortened"]
+
+
+def shortened(text: str, trials: int, catch: int = 1) -> str:
+    """A ready plan whose sitting takes seconds: one trial of practice, short touches, a break of a second."""
+    for key, value in {
+        "trials": trials, "practice": 1, "catch": catch, "break_every": max(3, trials // 2), "break_seconds": 1,
+        "interval_seconds": 0.3, "pause_seconds": 0.5,
+    }.items():  # fmt: skip
+        text, count = re.subn(rf"(?m)^{key} = \S+", f"{key} = {value}", text)
+        if not count:
+            text = text.replace("[sitting]\n", f"[sitting]\n{key} = {value}\n")
+    return text
+
+
+class Sitting:
+    """`palpate experiment run` in a process of its own, and its two pages in a browser."""
+
+    def __init__(self, browser, plan: Path, *options: str, label: str = "sub-01") -> None:
+        self.felt: dict[int, float] = {}  # largest force on the page's bar, by interval of the trial
+        command = [sys.executable, "-m", "palpate", "experiment", "run", plan.name, label, "--no-browser"]
+        self.process = subprocess.Popen(
+            [*command, "--port", "0", *options], cwd=plan.parent, stderr=subprocess.PIPE, text=True
+        )
+        urls, said = {}, []
+        for line in self.process.stderr:
+            said.append(line)
+            if known := re.match(r"(participant|control): +(http\S+)", line):
+                urls[known[1]] = known[2]
+            if len(urls) == 2:
+                break
+        assert len(urls) == 2, "".join(said)
+        self.complaints = []
+        self.page, self.control = (self._open(browser, urls[name]) for name in ("participant", "control"))
+
+    def _open(self, browser, url):
+        page = browser.new_context(viewport={"width": 390, "height": 780}).new_page()
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.goto(url)
+        page.wait_for_selector("html[data-phase]")
+        return page
+
+    @property
+    def phase(self) -> str:
+        return self.page.evaluate("document.documentElement.dataset.phase")
+
+    def act(self, trials: int, *, press: bool, seconds: float = 200.0, answer=lambda felt: 2) -> None:
+        """Answer so many trials, then stop in the middle of a touch; at the end of the sitting, at once.
+
+        `answer` gives an answer to the forces that the page showed; where it asks for ratings, those are given in turn.
+        """
+        answered, until = 0, time.monotonic() + seconds
+        while time.monotonic() < until:
+            phase = self.phase
+            if phase == "consent":
+                self._click("#agree")
+            elif phase == "ready":
+                self._click("#go")
+            elif phase == "touch":
+                if press:
+                    self._press()
+                if answered == trials:
+                    time.sleep(0.2)
+                    return
+                self._feel()
+                self.page.mouse.up()
+            elif phase == "question":
+                if self.page.locator("#ratings button").count():
+                    self._rate()
+                else:
+                    self.page.keyboard.press(str(answer(self.felt)))
+                self._leave("question")
+                self.felt, answered = {}, answered + 1
+            elif phase == "done":
+                return
+            time.sleep(0.02)
+        raise AssertionError(f"still {self.phase} after {answered} answers")
+
+    def _feel(self) -> None:
+        """Look at the bar of the force until the touch is over; a press that came too late is tried again."""
+        until = time.monotonic() + 5.0
+        while self.phase == "touch" and time.monotonic() < until:
+            second = self.page.inner_text("#which").startswith("Second")
+            height = self.page.evaluate("parseFloat(document.querySelector('#force i').style.height) || 0")
+            interval = 2 if second else 1
+            self.felt[interval] = max(self.felt.get(interval, 0.0), height)
+            time.sleep(0.03)
+
+    def _rate(self) -> None:
+        for number, statement in enumerate(self.page.locator("#ratings fieldset").all()):
+            statement.locator(f"input[value='{3 + number}']").check()
+        self.page.click("#ratings button")
+
+    def _click(self, what: str) -> None:
+        with contextlib.suppress(Error):  # the phase has changed meanwhile
+            self.page.click(what, timeout=300)
+
+    def _press(self) -> None:
+        box = self.page.locator("#pad").bounding_box()
+        if box is None:
+            return
+        x, y = box["x"] + box["width"] / 2, box["y"] + 20
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        self.page.mouse.move(x, y + 0.4 * box["height"], steps=4)
+
+    def _leave(self, phase: str, most: float = 60_000) -> None:
+        self.page.wait_for_selector(f"html:not([data-phase={phase}])", timeout=most)
+
+    def end(self, *, kill: bool = False) -> int:
+        if kill:
+            self.process.kill()
+        code = self.process.wait(60)
+        self.process.stderr.close()
+        for page in (self.page, self.control):
+            page.context.close()
+        assert self.complaints == []
+        return code

@@ -36,6 +36,7 @@ from .physics import Section as Section
 from .physics import SphereProbe as SphereProbe
 from .physics import StepAndHold as StepAndHold
 from .physics import SurfaceTool as SurfaceTool
+from .physics import Pinch as Pinch
 from .physics import SurfaceTraction as SurfaceTraction
 from .physics import TipLoad as TipLoad
 from .physics import Varied as Varied

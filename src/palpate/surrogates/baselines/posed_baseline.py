@@ -40,7 +40,6 @@ from palpate.surrogates.energy_kernels import (
     Compiled,
 )
 from palpate.surrogates.surface import distance_into
-from palpate.tools import front_balls
 from palpate.units import Range
 
 __all__ = ["PosedBaseline"]
@@ -79,9 +78,7 @@ class PosedBaseline(ToolBaseline):
     @cached_property
     def balls(self) -> np.ndarray:
         """Centres in the tool's frame from its place, radius, both in m, and share (b, 5) of each ball of its front."""
-        balls = front_balls(self.posed_tool.shape)
-        balls[:, 2] += self.posed_tool.shape.front
-        return balls
+        return self.posed_tool.balls
 
     @property
     def inner(self) -> float:

@@ -27,6 +27,7 @@ from .physics import Fixed as Fixed
 from .physics import GluedPad as GluedPad
 from .physics import LoadAndUnload as LoadAndUnload
 from .physics import LumpProblem as LumpProblem
+from .physics import Pinch as Pinch
 from .physics import PointForce as PointForce
 from .physics import PointLoad as PointLoad
 from .physics import PrescribedDisplacement as PrescribedDisplacement
@@ -36,7 +37,6 @@ from .physics import Section as Section
 from .physics import SphereProbe as SphereProbe
 from .physics import StepAndHold as StepAndHold
 from .physics import SurfaceTool as SurfaceTool
-from .physics import Pinch as Pinch
 from .physics import SurfaceTraction as SurfaceTraction
 from .physics import TipLoad as TipLoad
 from .physics import Varied as Varied

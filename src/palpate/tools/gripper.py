@@ -138,7 +138,10 @@ class Gripper:
         """The jaws in their orientations, that on the positive side first."""
         x, z = (np.array(v) for v in AXES[self.axis])
         y = np.cross(z, x)
-        x, y = math.cos(self.roll) * x + math.sin(self.roll) * y, math.cos(self.roll) * y - math.sin(self.roll) * x
+        x, y = (
+            math.cos(self.roll) * x + math.sin(self.roll) * y,
+            math.cos(self.roll) * y - math.sin(self.roll) * x,
+        )
         # half a turn about the first jaw's x makes the second one its mirror image
         turns = (np.stack([x, y, z], axis=1), np.stack([x, -y, -z], axis=1))
         return (
@@ -159,9 +162,7 @@ class Gripper:
     @cached_property
     def balls(self) -> tuple[np.ndarray, np.ndarray]:
         """The balls of each jaw's front (b, 5) from its place in the body's axes; see `front_balls`."""
-        first, last = (
-            np.hstack([jaw.balls[:, :3] @ _turn(jaw).T, jaw.balls[:, 3:]]) for jaw in self.jaws
-        )
+        first, last = (np.hstack([jaw.balls[:, :3] @ _turn(jaw).T, jaw.balls[:, 3:]]) for jaw in self.jaws)
         return first, last
 
     def front(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -182,7 +183,10 @@ class Gripper:
             return False
         images = (first, last) if e @ matrix @ e > 0 else (last, first)
         pairs = zip((first, last), images, strict=True)
-        return all(own.shape == image.shape and own.shape.keeps(_turn(image).T @ matrix @ _turn(own)) for own, image in pairs)
+        return all(
+            own.shape == image.shape and own.shape.keeps(_turn(image).T @ matrix @ _turn(own))
+            for own, image in pairs
+        )
 
     def require_trained(self, X: np.ndarray) -> None:
         """Refuse inputs (N, 4) whose opening is below zero, or outside of what was trained.
@@ -202,7 +206,7 @@ class Gripper:
         why = (
             "The jaws' foremost points can't pass each other."
             if value < 0
-            else f"The solves were made with {millimetres(low)} to {millimetres(high)}: what happens beyond is not known."
+            else f"The solves were made with {millimetres(low)} to {millimetres(high)}: beyond, nothing is known."
         )
         raise UsageError(
             f"The jaws are to be {millimetres(value)} apart in row {row}.",

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Pinch"]
 
-LEAD = -0.25  # depth of the jaw that lags over that of the other, at least: below 0 it is not in touch yet
+LEAD = -0.1  # depth of the jaw that lags over that of the other, at least: below 0 it is not in touch yet
 LINES = 9  # lines through the body along each axis, between whose ends the ranges are taken
 MARGIN = 1.3  # how far beyond its lines a jaw may touch, over its size
 INSET = 2.0  # distance of the lines from the surface's ends over the jaws' size, unless `over` is given
@@ -66,7 +66,7 @@ class Pinch(PlainInteraction):
         Stiffness k of each pad in N/m³, with a stop at 4 mm or at the jaw's least radius of curvature.
     depth : tuple of two floats
         Least and largest depth in m of the jaw that presses deeper, along the axis, below the body's outermost point.
-        The other jaw is between that depth and a quarter of it before touch.
+        The other jaw is between that depth and a tenth of it before touch.
     over : tuple of two corners, optional
         Corners of the box of lines along which the body is pinched: two coordinates across the axis, in m. By default
         the surface less a margin in which the jaws do not reach its ends.
@@ -143,7 +143,7 @@ class Pinch(PlainInteraction):
         """Return small elements wherever a jaw may touch: on both ends of the lines."""
         require_known("surface", self.touches, geometry.surfaces)
         patch = Patch.from_mesh(geometry.rest(), self.touches)
-        element = min(tool._size_of_elements() for tool in self.tools)  # noqa: SLF001  # its own rule for elements
+        element = min(tool._size_of_elements() for tool in self.tools)  # its own rule for elements
         low, high = self._box(patch)
         reach = max(max(tool.shape.half_widths(max(self.depth))) for tool in self.tools) + MARGIN * self._size
         along = self._along
@@ -162,7 +162,9 @@ class Pinch(PlainInteraction):
         rows = np.concatenate([self._rows(ends, pair) for pair in np.concatenate([depths, lags])])
         low, high = rows.min(axis=0), rows.max(axis=0)
         names = (*GRIP, OPENING)
-        return tuple(Range(name, float(a), float(b), "m") for name, a, b in zip(names, low, high, strict=True))
+        return tuple(
+            Range(name, float(a), float(b), "m") for name, a, b in zip(names, low, high, strict=True)
+        )
 
     def design(self, geometry: Geometry, samples: int, seed: int, depths: int | None = None) -> np.ndarray:
         """Return inputs (samples, 4) in series, in each of which the jaws close along one line.
@@ -215,7 +217,7 @@ class Pinch(PlainInteraction):
             inspect=jaws.inspect,
             approach=jaws.approach,
             distance=jaws.distance,
-            first_step=min(tool._first_step() for tool in self.tools),  # noqa: SLF001  # its own rule for steps
+            first_step=min(tool._first_step() for tool in self.tools),  # its own rule for steps
             shifts=np.array(shifts),
             turns=turns,
         )
@@ -313,7 +315,9 @@ class _Jaws:
         """Return the mean length in m of both jaws' ways, their parts across the axis counted several times."""
         along = self._pinch.gripper.along
         squares = []
-        for start, end in zip(self._pinch.gripper.places(here), self._pinch.gripper.places(there), strict=True):
+        for start, end in zip(
+            self._pinch.gripper.places(here), self._pinch.gripper.places(there), strict=True
+        ):
             step = end - start
             axial = float(step @ along)
             squares.append(axial**2 + SIDEWAYS**2 * float(step @ step - axial**2))

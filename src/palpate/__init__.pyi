@@ -27,6 +27,7 @@ from .physics import Fixed as Fixed
 from .physics import GluedPad as GluedPad
 from .physics import LoadAndUnload as LoadAndUnload
 from .physics import LumpProblem as LumpProblem
+from .physics import Pinch as Pinch
 from .physics import PointForce as PointForce
 from .physics import PointLoad as PointLoad
 from .physics import PrescribedDisplacement as PrescribedDisplacement

@@ -47,7 +47,7 @@ def deck(
     width, height, ball = size[0] / 2 / MILLI, size[1] / MILLI, radius / MILLI
     across = graded(width, REACH * ball, fine / MILLI)
     down = graded(height, REACH * ball, fine / MILLI)
-    lines = [*block(across, across, down), *_cap(ball)]
+    lines = [*block(across, across, down), *cap(ball)]
     lines += contact(law, PENALTY * young / KILO / ball)
     lines += ["*BOUNDARY", "BOTTOM, 1, 3", "XSIDE, 1, 1", "YSIDE, 2, 2", "TOOLNODES, 1, 2"]
     for depth in depths:
@@ -105,21 +105,23 @@ def block(across: np.ndarray, along: np.ndarray, down: np.ndarray) -> list[str]:
     return [*lines, "*SURFACE, NAME=TOP", *(f"{n}, S2" for n in top)]
 
 
-def _cap(ball: float) -> list[str]:
-    """The ball's lower cap as a layer of hexahedra (C3D8) around x = y = 0, its tip at z = 0."""
+def cap(ball: float, *, half: bool = False) -> list[str]:
+    """A quarter or half of the ball's lower cap as a layer of hexahedra (C3D8), its tip at x = y = z = 0."""
     count = math.ceil(REACH / FACET)
     slopes = np.tan(np.arange(-1, count + 1) * REACH / count)  # of lines through the centre, in two planes
-    first, width = 1_000_000, len(slopes)  # numbers that the block's nodes and elements do not have
+    across = np.concatenate([-slopes[:1:-1], slopes[1:]]) if half else slopes
+    # numbers that the block's nodes and elements do not have
+    first, width, size = 1_000_000, len(slopes), len(across) * len(slopes)
     lines, faces = ["*NODE, NSET=TOOLNODES"], []
-    for layer, (i, j) in itertools.product((0, 1), np.ndindex(width, width)):
-        ray = np.array([slopes[i], slopes[j], -1.0])
+    for layer, (i, j) in itertools.product((0, 1), np.ndindex(len(across), width)):
+        ray = np.array([across[i], slopes[j], -1.0])
         place = (1 - THICK * layer) * ball * ray / np.linalg.norm(ray) + [0.0, 0.0, ball]
-        number = first + layer * width**2 + i * width + j
+        number = first + layer * size + i * width + j
         lines.append(", ".join(map(repr, [number, *place.tolist()])))
     lines.append("*ELEMENT, TYPE=C3D8, ELSET=TOOL")
-    for i, j in np.ndindex(width - 1, width - 1):
+    for i, j in np.ndindex(len(across) - 1, width - 1):
         n = first + i * width + j
         square = [n, n + width, n + width + 1, n + 1]
-        lines.append(", ".join(map(str, [n, *square, *(m + width**2 for m in square)])))
+        lines.append(", ".join(map(str, [n, *square, *(m + size for m in square)])))
         faces.append(f"{n}, S1")
     return [*lines, "*SURFACE, NAME=FRONT", *faces]

@@ -40,6 +40,7 @@ class Answer:
     # and stiffness are not-a-number there
     deepest: float | None = None
     torque: np.ndarray | None = None  # (3,) in N m about the tool's place; None of a probe that tells none
+    effort: float | None = None  # N, with which the body pushes two jaws apart; None of any other tool
 
     def words(self, names: Sequence[Range]) -> str:
         """Return the answer as lines for a person."""
@@ -48,14 +49,19 @@ class Answer:
         if self.deepest is not None:
             return f"{place}\n  {_unknown(self.deepest)}{beyond}"
         size = float(np.linalg.norm(self.force))
-        if size < _NOTHING:
+        if max(size, abs(self.effort or 0.0)) < _NOTHING:
             return f"{place}\n  no contact: force, stiffness and energy are zero{beyond}"
         largest = float(np.abs(self.stiffness).max())
         lines = [
             place,
             f"  force      {_row(self.force, size)} N, in all {size:.4g} N",
             *self._torque_in_words(),
-            f"  stiffness  {self.along():.4g} N/m along the force",
+            *(
+                []
+                if self.effort is None
+                else [f"  effort     {self.effort:.4g} N, by which the jaws are pushed apart"]
+            ),
+            *([] if size < _NOTHING else [f"  stiffness  {self.along():.4g} N/m along the force"]),
             f"  ∂F/∂c      {'; '.join(_row(row, largest) for row in self.stiffness)} N/m",
             f"  energy     {self.energy:.4g} J",
             f"  trust      {self._trust(names)}",
@@ -89,6 +95,7 @@ class Answer:
             stiffness=np.full((3, 3), none),
             deviation=none,
             torque=None if self.torque is None else np.full(3, none),
+            effort=None if self.effort is None else none,
             inside=False,
             deepest=deepest,
         )
@@ -102,11 +109,14 @@ class Answer:
             "inputs": self.inputs.tolist(),
             "force": self.force.tolist(),
             **({} if self.torque is None else {"torque": self.torque.tolist()}),
+            **({} if self.effort is None else {"effort": self.effort}),
             "stiffness": self.stiffness.tolist(),
             "energy": self.energy,
             "deviation": self.deviation,
             "inside": self.inside,
-            "contact": None if self.deepest is not None else float(np.linalg.norm(self.force)) >= _NOTHING,
+            "contact": None
+            if self.deepest is not None
+            else max(float(np.linalg.norm(self.force)), abs(self.effort or 0.0)) >= _NOTHING,
             "beyond": _names_beyond(self.inputs, names),
         }
 

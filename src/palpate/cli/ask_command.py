@@ -21,6 +21,7 @@ from palpate.runtime.touchable import touchable
 from palpate.surrogates import LearntEnergy, Surrogate
 from palpate.surrogates.fields.node_field import NodeField
 from palpate.surrogates.training_record import correction_warning
+from palpate.tools import Gripper
 from palpate.units import Range, parse_quantity
 
 __all__ = ["answers_at", "ask", "deflections", "inputs_of"]
@@ -102,6 +103,9 @@ def answers_at(body: Surrogate, X: np.ndarray) -> list[Answer]:
     ]
     if body.torque_evaluator is not None:
         answers = [replace(one, torque=t) for one, t in zip(answers, body.torque(X), strict=True)]
+    if isinstance(tool, Gripper):
+        efforts = body.effort(X).tolist()
+        answers = [replace(one, effort=effort) for one, effort in zip(answers, efforts, strict=True)]
     if energy.baseline.surface is None:
         return answers
     let_go, end = _let_go(body, X), energy.baseline.inner

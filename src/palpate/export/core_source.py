@@ -16,6 +16,7 @@ _BASELINES = (
     "constant_baseline.c",
     "overlap_baseline.c",
     "posed_baseline.c",
+    "pinch_baseline.c",
 )
 _PART = re.compile(r"@IF (\w+)@\n(.*?)@END@\n", re.DOTALL)
 _MEMORIES = ("relaxation.c", "indentation.c", "iwan_elements.c", "friction.c")

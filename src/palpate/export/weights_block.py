@@ -315,7 +315,7 @@ def identifier(name: str) -> str:
     return f"_{word}" if word[:1].isdigit() else word
 
 
-_BASELINES = ("contact", "pad", "constant", "overlap", "posed")
+_BASELINES = ("contact", "pad", "constant", "overlap", "posed", "pinch")
 _MEMORIES = ("relaxation", "indentation", "iwan-elements", "friction")
 
 

@@ -30,21 +30,23 @@ from palpate.options import FieldOptions
 from palpate.surrogates import Baseline, ContactBaseline, ContactLaw, LearntEnergy, Solves, TouchedSurface
 from palpate.surrogates.baselines import (
     OverlapBaseline,
+    PinchBaseline,
     PosedBaseline,
     ToolBaseline,
     deepest_ball,
     depth_series,
 )
 from palpate.surrogates.learnt_torque import ARM
-from palpate.tools import PosedTool, Sphere
+from palpate.tools import Gripper, PosedTool, Sphere
 from palpate.units import Range
 
 __all__ = ["FEWEST", "PressedSolves", "is_pressed", "recognise_pressed"]
 
 FEWEST = 6  # solves in contact: what the law and an affine network have to be found from, and judged by
 UPRIGHT = ("x_min", "x_max", "y_min", "y_max")  # what "side" of a box means
+AND = " + "  # between surfaces that are touched together
 PROBES = ("SphereProbe",)
-TOOL = "SurfaceTool"
+TOOL, PINCH = "SurfaceTool", "Pinch"
 RADIUS = "probe.radius"  # what a family calls it
 PLANE = 1e-9  # by how much the mean normal of a plane surface may fall short of one
 DISSIPATING = ("Plastic",)
@@ -64,7 +66,7 @@ def is_pressed(data: Dataset) -> bool:
 
 def _probe(data: Dataset) -> Mapping[str, Any] | None:
     acting = data.provenance.get("problem", {}).get("interactions", [])
-    probes = [a for a in acting if isinstance(a, Mapping) and a.get("type") in (*PROBES, TOOL)]
+    probes = [a for a in acting if isinstance(a, Mapping) and a.get("type") in (*PROBES, TOOL, PINCH)]
     return probes[0] if len(probes) == len(acting) == 1 else None
 
 
@@ -85,7 +87,8 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
             surface=pressed.surface,
             radius=pressed.radius,
             radius_input=pressed.radius_input,
-            options=field,
+            # a part that travels with one contact does not tell of two
+            options=replace(field, moving=field.moving and not pressed.pinched),
             drawn=pressed.drawn,
             shift=pressed.shift,
             tool=pressed.tool if pressed.posed else None,
@@ -102,7 +105,9 @@ def recognise_pressed(data: Dataset, request: Request) -> Recognised | None:
     # a law that was asked for is taken as it is
     rivals = None if options.get("choose") is False else pressed.overlap_baselines
     learn = partial(learn_arm, pressed.data, pressed.inputs, matrices=pressed.matrices, about=pressed.about)
-    numbers = {} if pressed.tool is None or pressed.angles else {ARM: learn}  # turns tell the torque
+    # turns tell the torque; that of two jaws is not in proportion to the force on both together
+    tells = pressed.tool is None or pressed.angles > 0 or pressed.pinched
+    numbers = {} if tells else {ARM: learn}
     return Recognised(
         baseline,
         pressed.solves,
@@ -142,6 +147,7 @@ class PressedSolves:
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # way from the place to the ball's centre, m
     posed: bool = False  # whether which of the tool's points is the deepest depends on the inputs
     angles: int = 0  # inputs after the place that are components of a rotation vector
+    pinched: bool = False  # whether the tool is two jaws, whose opening is the input after the place
 
     @classmethod
     def of(cls, data: Dataset, layout: Layout | None = None) -> PressedSolves:
@@ -164,12 +170,12 @@ class PressedSolves:
         if has_middles(data):
             shown = data["drawn_points"], data["drawn_triangles"]
             drawn = CarriedSurface.bind(*shown, points, own)
-        which, tool = _radius_input(data), PosedTool.of(probe) if probe["type"] == TOOL else None
+        which, tool = _radius_input(data), _tool(probe, data.ranges)
         radius, shift, posed = _ball(probe, tool, rest[triangles[touched]])
         largest = radius if which is None else data.ranges[which].high
         radius = radius if which is None else (data.ranges[which].low + largest) / 2
         matrices, about = declared_symmetry(data)
-        angles = 0 if tool is None else len(tool.angles)
+        angles = len(tool.angles) if isinstance(tool, PosedTool) else 0
         element = data.provenance["problem"].get("element")
         return cls(
             data,
@@ -197,6 +203,7 @@ class PressedSolves:
             (float(shift[0]), float(shift[1]), float(shift[2])),
             posed,
             angles,
+            isinstance(tool, Gripper),
         )
 
     @property
@@ -206,7 +213,8 @@ class PressedSolves:
         parts = law, self.surface, self.radius, self.radius_input, self.resolved
         if self.tool is None:
             return ContactBaseline(*parts)
-        return (PosedBaseline if self.posed else ToolBaseline)(*parts, self.tool)
+        kind = PinchBaseline if self.pinched else PosedBaseline if self.posed else ToolBaseline
+        return kind(*parts, self.tool)
 
     def overlap_baselines(self) -> list[Baseline]:
         """Return the baselines by the ball's overlap; none over a flat surface, or where the radius is an input."""
@@ -224,7 +232,7 @@ class PressedSolves:
     def solves(self) -> Solves:
         """Inputs, energies, forces and stiffnesses as learning takes them."""
         data = self.data
-        felt = 3 + self.angles
+        felt = 3 + self.angles + self.pinched
         K = data.response_gradient[:, :felt, :felt] if "response_gradient" in data else None
         symmetry = self.matrices if len(self.matrices) > 1 else np.zeros((0, 3, 3))
         return Solves(
@@ -241,6 +249,8 @@ class PressedSolves:
     @property
     def depth_series(self) -> np.ndarray:
         """Number (N,) of each solve's depth series, whatever its further inputs are."""
+        if self.pinched:
+            return self.baseline.groups(self.data.X)
         return depth_series(self.data.X[:, :3], self.surface, self.radius)
 
     def painted_region(self, energy: LearntEnergy, deviation: float | None) -> PaintedRegion | None:
@@ -288,7 +298,7 @@ class PressedSolves:
 
 
 def _ball(
-    probe: Mapping[str, Any], tool: PosedTool | None, corners: np.ndarray
+    probe: Mapping[str, Any], tool: PosedTool | Gripper | None, corners: np.ndarray
 ) -> tuple[float, np.ndarray, bool]:
     """Return the radius in m of the ball whose depth counts, and the way (3,) in m from the place to its centre.
 
@@ -297,6 +307,8 @@ def _ball(
     """
     if tool is None:
         return float(probe["radius"]), np.zeros(3), False
+    if isinstance(tool, Gripper):
+        return max(tool.jaw.size, tool.far_jaw.size), np.zeros(3), True
     a, b, c = np.moveaxis(corners, 1, 0)
     areas = np.cross(b - a, c - a)
     normal = areas.sum(axis=0) / np.linalg.norm(areas, axis=1).sum()
@@ -305,6 +317,13 @@ def _ball(
     if tool.turns == "fixed" and np.linalg.norm(normal) > 1 - PLANE:
         return *deepest_ball(tool, normal), False
     return tool.shape.size, np.zeros(3), True
+
+
+def _tool(probe: Mapping[str, Any], ranges: tuple[Range, ...]) -> PosedTool | Gripper | None:
+    """Return the tool or the gripper of a record, the latter with its trained openings; None of a ball."""
+    if probe["type"] == PINCH:
+        return replace(Gripper.of(probe), trained=(ranges[3].low, ranges[3].high))
+    return PosedTool.of(probe) if probe["type"] == TOOL else None
 
 
 def _widened(
@@ -377,7 +396,10 @@ def _surface(
         surfaces = list(layout.surfaces)
 
     def on(name: str) -> np.ndarray:
-        names = (name,) if name in surfaces else UPRIGHT if name == "side" else ()
+        parts = [name] if name in surfaces else name.split(AND)
+        names = [
+            own for part in parts for own in (UPRIGHT if part == "side" and part not in surfaces else (part,))
+        ]
         mine = np.isin(of, [i for i, one in enumerate(surfaces) if one in names])
         if not mine.any():
             raise UsageError(

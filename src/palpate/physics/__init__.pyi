@@ -24,6 +24,7 @@ from .interactions import BodyForce as BodyForce
 from .interactions import Fixed as Fixed
 from .interactions import GluedPad as GluedPad
 from .interactions import Interaction as Interaction
+from .interactions import Pinch as Pinch
 from .interactions import PointForce as PointForce
 from .interactions import PrescribedDisplacement as PrescribedDisplacement
 from .interactions import Pressure as Pressure

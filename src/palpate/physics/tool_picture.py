@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.tools import PosedTool
 from palpate.tools.tool_mesh import ToolMesh, tool_mesh
 
 __all__ = ["outline_of", "tool_surface"]
@@ -18,7 +19,18 @@ def tool_surface(solution: Any) -> ToolMesh | None:
     tool, pose = getattr(solution, "tool", None), getattr(solution, "pose", None)
     if tool is None or pose is None:
         return None
-    place, turn = tool.pose(pose)
+    meshes = [_placed(own, x) for own, x in tool.solids(pose)]
+    first = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    return ToolMesh(
+        np.concatenate([mesh.points for mesh in meshes]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+        np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, first, strict=False)]),
+    )
+
+
+def _placed(tool: PosedTool, x: np.ndarray) -> ToolMesh:
+    """Return the surface of one tool at its own inputs."""
+    place, turn = tool.pose(x)
     mesh = tool_mesh(tool.shape)
     points = place + (mesh.points + np.array([0.0, 0.0, tool.shape.front])) @ turn.T
     return ToolMesh(points, mesh.normals @ turn.T, mesh.triangles)

@@ -33,6 +33,7 @@ from palpate.surrogates.fields import (
     modal_fields,
     surface_fields,
 )
+from palpate.surrogates.grip_effort import efforts
 from palpate.surrogates.learnt_quantities import LearntQuantities
 from palpate.surrogates.learnt_torque import ARM, torque_evaluator, torques
 from palpate.surrogates.lumps import Lump, LumpContrast
@@ -216,6 +217,16 @@ class Surrogate:
             If the body tells none: a ball feels no torque about its centre.
         """
         return torques(self.hand_energy, self.torque_evaluator, X, self.name)
+
+    def effort(self, X: np.ndarray) -> np.ndarray:
+        """Return the effort G = −∂U/∂w (N,) in N with which the body pushes two jaws apart, at inputs X (N, 4).
+
+        Raises
+        ------
+        UsageError
+            For a body that was not learnt from pinches.
+        """
+        return efforts(self.hand_energy, X)
 
     @property
     def _remembers(self) -> str:

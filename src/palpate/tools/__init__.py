@@ -7,12 +7,14 @@
     rotations     rotation vectors, their matrices and how turns follow from their changes
     front_balls   a tool's front as balls
     posed_tool    a tool in an orientation, its pose by its inputs, and how it is written to files
+    gripper       two jaws as one tool, their opening an input
 
 A tool's own frame has its origin in the tool's centre. The tool points along −z: its foremost point is (0, 0, −front).
 """
 
 from palpate.tools.edged_tools import Box, Cylinder, Punch
 from palpate.tools.front_balls import front_balls
+from palpate.tools.gripper import Gripper
 from palpate.tools.posed_tool import PosedTool, Turns
 from palpate.tools.rotations import left_jacobian, rotation_matrix
 from palpate.tools.round_tools import Capsule, Cone, Fingertip, Sphere
@@ -25,6 +27,7 @@ __all__ = [
     "Cone",
     "Cylinder",
     "Fingertip",
+    "Gripper",
     "PosedTool",
     "Punch",
     "ScannedTool",

@@ -13,13 +13,14 @@ import numpy as np
 from palpate import checks
 from palpate.errors import UsageError
 from palpate.tools.edged_tools import Box, Cylinder, Punch
+from palpate.tools.front_balls import front_balls
 from palpate.tools.rotations import rotation_matrix
 from palpate.tools.round_tools import Capsule, Cone, Fingertip, Sphere
 from palpate.tools.scanned_tool import ScannedTool
 from palpate.tools.tool_shape import Tool
 from palpate.units import Range
 
-__all__ = ["PosedTool", "Turns"]
+__all__ = ["PosedTool", "Turns", "shape_of"]
 
 Turns = Literal["fixed", "axis", "full"]
 """What of a tool's orientation is an input: nothing, its axis, or all of it."""
@@ -35,6 +36,17 @@ MOST_TILT = math.pi / 2  # rad; a tool that lies over farther does not press wit
 SHAPES: dict[str, type[Tool]] = {
     shape.__name__: shape for shape in (Box, Capsule, Cone, Cylinder, Fingertip, Punch, ScannedTool, Sphere)
 }
+
+
+def shape_of(record: Mapping[str, Any]) -> Tool:
+    """Return the shape that `Tool.describe` wrote; an unknown one is refused with those that there are."""
+    own = dict(record)
+    kind = str(own.pop("type", ""))
+    if kind not in SHAPES:
+        raise UsageError(
+            f"There is no tool {kind!r}.", why=f"Known are {', '.join(SHAPES)}.", fix="Name one of them."
+        )
+    return SHAPES[kind](**own)
 
 
 @dataclass(frozen=True)
@@ -109,14 +121,8 @@ class PosedTool:
         UsageError
             For a shape that is not known.
         """
-        own = dict(record["shape"])
-        kind = str(own.pop("type", ""))
-        if kind not in SHAPES:
-            raise UsageError(
-                f"There is no tool {kind!r}.", why=f"Known are {', '.join(SHAPES)}.", fix="Name one of them."
-            )
         options = {name: record[name] for name in ("turns", "tilt") if name in record}
-        return cls(SHAPES[kind](**own), tuple(record.get("rotation", (0.0, 0.0, 0.0))), **options)
+        return cls(shape_of(record["shape"]), tuple(record.get("rotation", (0.0, 0.0, 0.0))), **options)
 
     def describe(self) -> dict[str, Any]:
         """Return the tool as plain data for a JSON file; what turns only where something does."""
@@ -132,6 +138,23 @@ class PosedTool:
         """Return place (..., 3) in m and rotation (..., 3, 3) at inputs (..., 3 + k): the place, then the angles."""
         place = np.asarray(x, dtype=float)[..., :3]
         return place, self.rotations(np.asarray(x, dtype=float)[..., 3:])
+
+    def solids(self, x: np.ndarray) -> list[tuple[PosedTool, np.ndarray]]:
+        """Return the tool and its own inputs at inputs (3 + k,): a gripper has several."""
+        return [(self, np.asarray(x, dtype=float))]
+
+    def front(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return centres (N, b, 3), radii (b,), both in m, and shares (b,) of its front's balls at inputs (N, 3 + k)."""
+        place, turn = self.pose(X)
+        centres = place[:, None] + np.einsum("nij,bj->nbi", turn, self.balls[:, :3])
+        return centres, self.balls[:, 3], self.balls[:, 4]
+
+    @cached_property
+    def balls(self) -> np.ndarray:
+        """Centres in the tool's frame from its place, radius, both in m, and share (b, 5) of each ball of its front."""
+        balls = front_balls(self.shape)
+        balls[:, 2] += self.shape.front
+        return balls
 
     def rotations(self, angles: np.ndarray) -> np.ndarray:
         """Return the rotations (..., 3, 3) from the tool's frame to the body's at angles (..., k) in rad."""

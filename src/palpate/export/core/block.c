@@ -153,6 +153,10 @@ PP_PART int pp_baseline_fits(const pp_array *a, const int32_t *head) {
     if (k != 3 || (n != 3 && n != 5 && n != 6) || !pp_is(&own[0], 7, 1, 1) || !pp_surface_fits(own + 1)) return 0;
     return pp_is(&own[4], own[4].n[0], 5, 1) && own[4].n[0] > 0 && pp_is(&own[5], 3, 3, 1) && own[0].real[6] > R(0);
   }
+  if (head[PP_BASELINE_CODE] == 6) {
+    if (k != 3 || n != 4 || !pp_is(&own[0], 7, 1, 1) || !pp_surface_fits(own + 1) || !pp_is(&own[6], 3, 1, 1)) return 0;
+    return pp_is(&own[4], own[4].n[0], 5, 1) && pp_is(&own[5], own[5].n[0], 5, 1) && own[4].n[0] > 0 && own[5].n[0] > 0 && own[0].real[6] > R(0);
+  }
   if (head[PP_BASELINE_CODE] == 3) return pp_dense(&own[0]) && own[0].n[0] == 1;
   if (!pp_is(&own[0], k, 3, 1) || !pp_dense(&own[1]) || own[1].n[1] != k * (k + 1) / 2 || !pp_is(&own[2], own[1].n[0], 2, 0)) return 0;
   for (i = 0; i < 2 * own[1].n[0]; i++) {
@@ -221,7 +225,7 @@ PP_PART int pp_open(const unsigned char *bytes, uint64_t size, pp_array *arrays)
   if (!pp_is(&arrays[PP_HEAD], 7, 1, 0)) return PP_MISFIT;
   n = head[PP_INPUTS];
   k = head[PP_FELT];
-  if (head[PP_BASELINE_CODE] < 1 || head[PP_BASELINE_CODE] > 5) return PP_UNKNOWN;
+  if (head[PP_BASELINE_CODE] < 1 || head[PP_BASELINE_CODE] > 6) return PP_UNKNOWN;
   if (head[PP_MEMORY_CODE] < 0 || head[PP_MEMORY_CODE] > 4) return PP_UNKNOWN;
   if (n < 1 || n > PP_MOST || k < 1 || k > 3 || k > n || head[PP_RADIUS_INPUT] >= n) return PP_MISFIT;
   if (!pp_is(&arrays[PP_NUMBERS], 5, 1, 1) || !pp_is(&arrays[PP_LIMITS], 3, n, 1)) return PP_MISFIT;

@@ -53,10 +53,11 @@ PP_PART pp_real pp_nan(void) {
   return none / none;
 }
 
-/* whether the body is pressed by a free probe: by the closest point (1), by its overlap (4), by a tool in a pose (5) */
+/* whether the body is pressed by a free probe: by the closest point (1), by its overlap (4), by a tool in a pose (5), or
+ * pinched by two jaws (6) */
 PP_PART int pp_is_probe(const pp_array *a) {
   const int32_t code = a[PP_HEAD].whole[PP_BASELINE_CODE];
-  return code == 1 || code == 4 || code == 5;
+  return code == 1 || code >= 4;
 }
 
 PP_PART const pp_array *pp_baseline_array(const pp_model *m, int32_t i) { return &m->a[PP_BASELINE + i]; }

@@ -48,6 +48,7 @@ class EnergySamples:
     groups: np.ndarray  # (N,), solves of one number tell of each other
     inputs: tuple[Range, ...]  # names, units and trained ranges
     felt: int  # k
+    forceful: int  # inputs whose forces count: the felt ones, and those after them that have one of their own
     numbers: np.ndarray  # (N,), of the solves that they were made from
 
     @classmethod
@@ -68,7 +69,18 @@ class EnergySamples:
         touching[touching] = (E[touching] > 0) | (baseline.row_weights(X[touching]) > GAP)
         _require_energy(s, E, touching, baseline.holds)
         resting = np.isfinite(K[:, :k, :k]).all(axis=(1, 2)) & ~touching & baseline.holds
-        samples = cls(X, E, F, (K + K.transpose(0, 2, 1)) / 2, s, np.arange(N), inputs, k, np.arange(N))
+        samples = cls(
+            X,
+            E,
+            F,
+            (K + K.transpose(0, 2, 1)) / 2,
+            s,
+            np.arange(N),
+            inputs,
+            k,
+            k + baseline.forces,
+            np.arange(N),
+        )
         samples = samples.take(touching | resting)
         return replace(samples, groups=baseline.groups(samples.X))
 
@@ -118,7 +130,7 @@ class EnergySamples:
     def rows(self, baseline: Baseline, *, curvature_share: float = CURVATURE_SHARE) -> dict[str, np.ndarray]:
         """Return what `refine` takes besides X: targets and natural weights; a stiffness has a share of a force's."""
         Y, slopes, curvatures = self.targets(baseline)
-        half, n, k = self.half, len(self.inputs), self.felt
+        half, n, k = self.half, len(self.inputs), self.forceful
         i, j = pairs(n)
         size = np.linalg.norm(self.force[:, :k], axis=1)
         size = size.clip(max(baseline.force_floor * size.max(), 1e-300))

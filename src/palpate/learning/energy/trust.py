@@ -47,7 +47,7 @@ def trust_of(ensemble: EnergyEnsemble, samples: EnergySamples) -> Trust:
         spread = V * np.sqrt(values / (1.0 - values))
         for row, (i, first) in enumerate(solves):
             if fold[i] == left:
-                block = np.r_[i, first + np.arange(samples.felt)]
+                block = np.r_[i, first + np.arange(samples.forceful)]
                 errors[row] = np.linalg.norm(to_force[row] @ missed[block, 0])
                 sizes[row] = np.linalg.norm(to_force[row] @ spread[np.searchsorted(members, block)])
     groups = int(rows.groups.max()) + 1
@@ -67,7 +67,7 @@ def _slope_rows(rows: Rows) -> list[tuple[int, int]]:
 
 def _to_force(rows: Rows, samples: EnergySamples) -> np.ndarray:
     """Return (S, k, 1 + k): what errors of a solve's weighted rows make of its force, relative to it."""
-    rows_with_force, k = rows.sloped, samples.felt
+    rows_with_force, k = rows.sloped, samples.forceful
     force = samples.force[rows_with_force, :k]
     size = np.linalg.norm(force, axis=1)
     to_force = np.zeros((len(rows_with_force), k, 1 + k))

@@ -3,6 +3,7 @@
 interaction         the contract: an interaction, and its terms on an opened body
 sphere              a rigid sphere that presses a surface
 surface_tool        a rigid tool of any shape that presses one
+pinch               two jaws that close on a body between them
 glued               a pad that is glued to a surface and moved
 prescribed          a surface, or a part of it, that is moved by given amounts; rollers
 loads               a point force, a traction, a body force, a pressure that follows its surface
@@ -22,6 +23,7 @@ from palpate.physics.interactions.interaction import Attached, Energy, Field, Fi
 from palpate.physics.interactions.interaction_checks import free_motions, require_support
 from palpate.physics.interactions.loads import BodyForce, PointForce, Pressure, SurfaceTraction
 from palpate.physics.interactions.pads import PadShare, pad_share
+from palpate.physics.interactions.pinch import Pinch
 from palpate.physics.interactions.prescribed import PrescribedDisplacement, roller
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.interactions.surface_tool import SurfaceTool
@@ -35,6 +37,7 @@ __all__ = [
     "GluedPad",
     "Interaction",
     "PadShare",
+    "Pinch",
     "Planned",
     "PointForce",
     "PrescribedDisplacement",

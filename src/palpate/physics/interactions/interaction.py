@@ -126,15 +126,16 @@ class Attached:
         going straight from `approach`; by default the Euclidean length.
     first_step : float
         Longest first step along a path, as such a length; later ones adapt.
-    shifts : (3, dof) array, optional
-        For energies of Rᵀ(X + u − p) alone, as a rigid tool's, whose place p are the first inputs: unknowns of a
-        constant displacement along each. The energies change with p as they do with the unknowns the other way, so
-        all their derivatives by inputs follow from those by unknowns, and none is taken symbolically.
+    shifts : (energies, 3 or more, dof) array, optional
+        For energies of Rᵀ(X + u − p) alone, as a rigid tool's, whose place p moves with the first inputs: of each
+        energy, the unknowns of the constant displacement by which one unit of each input moves p. The energy changes
+        with p as it does with the unknowns the other way, so all its derivatives by inputs follow from those by
+        unknowns, and none is taken symbolically.
     turns : callable, optional
         Gives for unknowns (dof,) and inputs (n,) the unknowns (3, dof) by which the displaced body turns rigidly about
         x, y and z through the tool's place: the torque on the tool is what its energies change by.
     rates : callable, optional
-        Gives for inputs (n,) the turn (n − 3, 3) of the tool about x, y and z by one unit of each further input.
+        Gives for inputs (n,) the turn (n − 3, 3) of a single tool about x, y and z by one unit of each further input.
     stiffen : callable, optional
         Gives a very stiff pad a share of its stiffness, 1 after attaching: a path is easier under a softer one.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,7 +22,7 @@ from palpate.units import Range
 if TYPE_CHECKING:
     from palpate.physics.shapes.shape import Geometry
 
-__all__ = ["SurfaceTool"]
+__all__ = ["SurfaceTool", "rigid_motions"]
 
 ELEMENT = 0.5  # element size under the tool over its size, as under a sphere
 # the same at most over the least radius of curvature: two quadratic elements go round half a turn of an edge
@@ -218,22 +219,33 @@ class SurfaceTool(PressingTool):
 
     def attach_pad(self, field: Field, pad: Any) -> Attached:
         """Return its contact energy on an opened body with a stiffness, a number in N/m³ or a parameter of NGSolve."""
-        import ngsolve
-
-        attached = super().attach_pad(field, pad)
-        axes = np.eye(3)
-        shifts = np.array([field.interpolate(ngsolve.CF(tuple(axis))) for axis in axes.tolist()])
-        rest = field.interpolate(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z)))
-        size = len(field.base.vec)
-
-        def turns(z: np.ndarray, q: np.ndarray) -> np.ndarray:
-            arm = (rest + z - q[:3] @ shifts)[:size].reshape(3, -1).T
-            turned = np.zeros((3, z.size))
-            turned[:, :size] = np.cross(axes[:, None], arm).transpose(0, 2, 1).reshape(3, -1)
-            return turned
+        shifts, turns = rigid_motions(field)
 
         def rates(q: np.ndarray) -> np.ndarray:
             w = np.append(q[3:], np.zeros(6 - q.size))
             return np.asarray(left_jacobian(w).T[: q.size - 3])
 
-        return replace(attached, shifts=shifts, turns=turns, rates=rates if self.angles else None)
+        return replace(
+            super().attach_pad(field, pad),
+            shifts=shifts[None],
+            turns=turns,
+            rates=rates if self.angles else None,
+        )
+
+
+def rigid_motions(field: Field) -> tuple[np.ndarray, Callable[[np.ndarray, np.ndarray], np.ndarray]]:
+    """Return unknowns (3, dof) of a displacement by 1 along x, y and z, and `Attached.turns` about the first inputs."""
+    import ngsolve
+
+    axes = np.eye(3)
+    shifts = np.array([field.interpolate(ngsolve.CF(tuple(axis))) for axis in axes.tolist()])
+    rest = field.interpolate(ngsolve.CF((ngsolve.x, ngsolve.y, ngsolve.z)))
+    size = len(field.base.vec)
+
+    def turns(z: np.ndarray, q: np.ndarray) -> np.ndarray:
+        arm = (rest + z - q[:3] @ shifts)[:size].reshape(3, -1).T
+        turned = np.zeros((3, z.size))
+        turned[:, :size] = np.cross(axes[:, None], arm).transpose(0, 2, 1).reshape(3, -1)
+        return turned
+
+    return shifts, turns

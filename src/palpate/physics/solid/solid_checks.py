@@ -19,6 +19,7 @@ from palpate.format import millimetres
 from palpate.physics.advice import advise
 from palpate.physics.interactions.interaction import Fixed, Interaction
 from palpate.physics.interactions.loads import BodyForce, PointForce, Pressure, SurfaceTraction
+from palpate.physics.interactions.pinch import Pinch
 from palpate.physics.interactions.pressing import PressingTool
 from palpate.physics.shapes.naming import members, require_known
 from palpate.physics.shapes.surface_checks import surface_gap
@@ -46,7 +47,7 @@ FLATTEST = 20.0
 # lengths of interactions in m, and how many times the body's longest side they may be
 LENGTHS = {"radius": FLATTEST, "depth": 1.0, "stop": 1.0, "displacement": 1.0, "element": 1.0}
 # interactions that push and hold nothing
-PUSHING = (PressingTool, PointForce, SurfaceTraction, BodyForce, Pressure)
+PUSHING = (PressingTool, Pinch, PointForce, SurfaceTraction, BodyForce, Pressure)
 # members that a geometry and a material must have
 GEOMETRY = ("surfaces", "regions", "mesh", "rest", "describe")
 MATERIAL = ("poisson", "density", "kinematics", "states", "volumetric", "energy", "advance", "describe")

@@ -17,6 +17,7 @@ from palpate.physics.apart import is_foreign, solve_apart
 from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Interaction, Planned
 from palpate.physics.interactions.pads import advise_on_pad
+from palpate.physics.interactions.pinch import Pinch
 from palpate.physics.interactions.pressing import PressingTool
 from palpate.physics.interactions.rigid_limit import with_rigid_pad
 from palpate.physics.interactions.sphere import RIGID, SphereProbe
@@ -36,7 +37,7 @@ from palpate.physics.solid.solid_checks import (
 )
 from palpate.processes import CASE_LIMIT
 from palpate.supervised import run_in_child
-from palpate.tools import PosedTool
+from palpate.tools import Gripper, PosedTool
 from palpate.units import Range
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ class SolidProblem:
         require_no_loose_part(self.body, self.interactions)
         for interaction in self.interactions:
             advise_on_sizes(interaction, self.element, self.longest)
-            if isinstance(interaction, SurfaceTool) and self.element is not None:
+            if isinstance(interaction, SurfaceTool | Pinch) and self.element is not None:
                 interaction.require_fine_elements(self.element)
             if isinstance(interaction, SphereProbe) and interaction.pad != RIGID:
                 advise_on_pad(interaction, self.body.materials)
@@ -175,7 +176,7 @@ class SolidProblem:
     def schema(self) -> tuple[Field, ...]:
         """Fields of each answer; a sweep asks for it."""
         edges = len(self.mesh.edges) if getattr(self.body.geometry, "drawn_apart", False) else 0
-        torque = any(isinstance(one, SurfaceTool) for one in self.interactions)
+        torque = any(isinstance(one, SurfaceTool | Pinch) for one in self.interactions)
         size = len(self.mesh.points)
         return solid_fields(size, self.ranges, stress=self.stress, edges=edges, torque=torque)
 
@@ -202,7 +203,7 @@ class SolidProblem:
     def symmetry(self) -> dict[str, Any] | None:
         """Isometries of body, supports, touched surface and tool as plain data; None but for one tool or glued pad."""
         acting = self.interactions[0]
-        if len(self.interactions) > 1 or not isinstance(acting, PressingTool | GluedPad):
+        if len(self.interactions) > 1 or not isinstance(acting, PressingTool | GluedPad | Pinch):
             return None
         symmetry = symmetry_of(self.body, acting.touches)
         if isinstance(acting, GluedPad):
@@ -211,6 +212,8 @@ class SolidProblem:
             )
         if isinstance(acting, SurfaceTool):
             symmetry = symmetry.part(acting.posed_tool.keeps(matrix) for matrix in symmetry.matrices)
+        if isinstance(acting, Pinch):
+            symmetry = symmetry.part(acting.gripper.keeps(matrix) for matrix in symmetry.matrices)
         return symmetry.describe()
 
     @cached_property
@@ -345,13 +348,15 @@ class SolidProblem:
             first += len(interaction.ranges(self.body.geometry))
         return None, None
 
-    def tool_at(self, x: np.ndarray) -> tuple[PosedTool | None, np.ndarray | None]:
-        """Return the first tool among the interactions, and its own inputs (3 + k,) among x (n,)."""
+    def tool_at(self, x: np.ndarray) -> tuple[PosedTool | Gripper | None, np.ndarray | None]:
+        """Return the first tool or gripper among the interactions, and its own inputs (3 + k,) among x (n,)."""
         first = 0
         for interaction in self.interactions:
             count = len(interaction.ranges(self.body.geometry))
             if isinstance(interaction, SurfaceTool):
                 return interaction.posed_tool, np.asarray(x[first : first + count])
+            if isinstance(interaction, Pinch):
+                return interaction.gripper, np.asarray(x[first : first + count])
             first += count
         return None, None
 

@@ -12,13 +12,14 @@ from palpate.errors import UsageError
 from palpate.format import number, span
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.stop import Stop
+from palpate.tools.gripper import OPENING
 from palpate.units import Range
 
 if TYPE_CHECKING:
     from palpate.physics.interactions.sphere import SphereProbe
     from palpate.physics.solid.solid_field import MidSides
     from palpate.physics.solid.solid_path import LoadStep
-    from palpate.tools import PosedTool
+    from palpate.tools import Gripper, PosedTool
 
 __all__ = ["SolidSolution"]
 
@@ -85,12 +86,12 @@ class SolidSolution:
         The sphere among the interactions, if there is one.
     centre : (3,) array or None
         Where its centre is, in m.
-    tool : PosedTool or None
-        The tool among the interactions, if there is one.
+    tool : PosedTool, Gripper or None
+        The tool or gripper among the interactions, if there is one.
     pose : (3 + k,) array or None
-        Its place in m, then its angles in rad where they are inputs.
+        Its place in m, then its angles in rad or its opening in m where they are inputs.
     torque : (3,) array or None
-        Torque on a `SurfaceTool` about its place, in N m; None without such a tool, and unless converged.
+        Torque on a `SurfaceTool` or `Pinch` about its place, in N m; None without one, and unless converged.
     mid_sides : MidSides or None
         Displacements in the middle of the mesh's edges, with which pictures are drawn; None unless converged.
     """
@@ -121,7 +122,7 @@ class SolidSolution:
     fixed: tuple[str, ...] = ()
     probe: SphereProbe | None = None
     centre: np.ndarray | None = None
-    tool: PosedTool | None = None
+    tool: PosedTool | Gripper | None = None
     pose: np.ndarray | None = None
     torque: np.ndarray | None = None
     mid_sides: MidSides | None = None
@@ -168,7 +169,7 @@ class SolidSolution:
         UsageError
             If an input is neither a length nor an angle of a tool.
         """
-        lengths = [r.unit == "m" for r in self.ranges]
+        lengths = [r.unit == "m" and r.name != OPENING for r in self.ranges]
         if not all(lengths) and self.torque is None:
             raise UsageError(
                 "This solution has no force by itself.",

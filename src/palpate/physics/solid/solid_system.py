@@ -179,7 +179,7 @@ class Inputs:
         self.constrained = np.zeros(field.size, dtype=bool)
         self._first: list[list[Any]] = [[] for _ in range(self.size)]
         self._second: dict[tuple[int, int], list[Any]] = {}
-        self._shifted: list[tuple[slice, Attached, Any]] = []
+        self._shifted: list[tuple[slice, Attached, np.ndarray, Any]] = []
         for part, rows in zip(attached, self.slices, strict=True):
             self._add(part, rows)
 
@@ -191,9 +191,9 @@ class Inputs:
     def gradient(self, z: np.ndarray, reactions: np.ndarray) -> np.ndarray:
         """Return ∂U/∂q (n,) at an equilibrium z (dof,) with ∂Π/∂z (dof,)."""
         state = self._at(z)
-        explicit = [sum(form.Energy(state) for form in forms) for forms in self._first]
-        for rows, part, form in self._shifted:
-            explicit[rows] = self._tool_gradient(part, form, z).tolist()
+        explicit = np.array([float(sum(form.Energy(state) for form in forms)) for forms in self._first])
+        for rows, part, shifts, form in self._shifted:
+            explicit[rows] += self._tool_gradient(part, shifts, form, z)
         return np.asarray(explicit - self.loads @ z + self.lifts @ reactions)
 
     def torque(self, z: np.ndarray, q: np.ndarray) -> np.ndarray | None:
@@ -201,14 +201,16 @@ class Inputs:
 
         The state is z (dof,) under inputs q (n,), which are set.
         """
-        for rows, part, form in self._shifted:
-            if part.turns is not None:
-                return np.asarray(part.turns(z, q[rows]) @ self._slope(form, self._at(z)))
-        return None
+        first = next((part for _, part, _, _ in self._shifted if part.turns is not None), None)
+        if first is None or first.turns is None:
+            return None
+        parts = [(rows, form) for rows, part, _, form in self._shifted if part is first]
+        slopes = [self._slope(form, self._at(z)) for _, form in parts]
+        return np.asarray(first.turns(z, q[parts[0][0]]) @ sum(slopes))
 
     def sensitivity(self, system: System, z: np.ndarray) -> np.ndarray:
         """Return ∂z/∂q (n, dof) with the system's present tangent."""
-        coupling = self._coupling(z) + self._lift_forces(system)
+        coupling = self._coupling(z, self._tool_couplings(z)) + self._lift_forces(system)
         return np.asarray(self.lifts - self._solve_rows(system, coupling))
 
     def hessian(self, system: System, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -218,11 +220,12 @@ class Inputs:
 
     def raw_hessian(self, system: System, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ∂²U/∂q∂q as it is computed, symmetric but for roundings, and ∂z/∂q."""
-        explicit, lifted = self._coupling(z), self._lift_forces(system)
+        tools = self._tool_couplings(z)
+        explicit, lifted = self._coupling(z, tools), self._lift_forces(system)
         coupling = explicit + lifted
         inner = self._solve_rows(system, coupling)
         mixed = self.lifts @ explicit.T
-        own = self._input_hessian(z, explicit) + mixed + mixed.T + self.lifts @ lifted.T
+        own = self._input_hessian(z, tools) + mixed + mixed.T + self.lifts @ lifted.T
         return own - coupling @ inner.T, self.lifts - inner
 
     def _add(self, part: Attached, rows: slice) -> None:
@@ -234,7 +237,9 @@ class Inputs:
         if part.constrained is not None:
             self.constrained |= part.constrained
         if part.shifts is not None:
-            self._shifted.append((rows, part, self._form([(e.density, e.measure) for e in part.energies])))
+            for energy, shifts in zip(part.energies, part.shifts, strict=True):
+                form = self._form([(energy.density, energy.measure)])
+                self._shifted.append((rows, part, shifts, form))
             return
         for term in part.energies:
             for i, first in enumerate(part.parameters):
@@ -259,10 +264,10 @@ class Inputs:
         form.Apply(state, result)
         return np.array(result.FV().NumPy())
 
-    def _tool_gradient(self, part: Attached, form: Any, z: np.ndarray) -> np.ndarray:
-        """Return ∂Π_t/∂q (3 + k,) of a rigid tool at its present inputs."""
+    def _tool_gradient(self, part: Attached, shifts: np.ndarray, form: Any, z: np.ndarray) -> np.ndarray:
+        """Return ∂Π_t/∂q (3 + k,) of one energy of a rigid tool at its present inputs."""
         slope = self._slope(form, self._at(z))
-        by_place = -part.shifts @ slope  # type: ignore[operator]  # it has shifts
+        by_place = -shifts @ slope
         if part.rates is None or part.turns is None:
             return np.asarray(by_place)
         q = np.array([parameter.Get() for parameter in part.parameters])
@@ -280,35 +285,44 @@ class Inputs:
             rows.append((ends[0] - ends[1]) / (2 * ANGLE_STEP))
         return np.array(rows)
 
-    def _coupling(self, z: np.ndarray) -> np.ndarray:
-        """Return ∂²Π/∂z∂q without the lifts, shape (n, dof)."""
+    def _coupling(self, z: np.ndarray, tools: list[np.ndarray]) -> np.ndarray:
+        """Return ∂²Π/∂z∂q without the lifts, shape (n, dof); `tools` are those of rigid tools' energies."""
         state, result = self._at(z), self._field.state.vec.CreateVector()
         coupling = -self.loads
         for row, forms in zip(coupling, self._first, strict=True):
             for form in forms:
                 form.Apply(state, result)
                 row += result.FV().NumPy()
-        for rows, part, form in self._shifted:
+        for (rows, *_), own in zip(self._shifted, tools, strict=True):
+            coupling[rows] += own
+        return coupling
+
+    def _tool_couplings(self, z: np.ndarray) -> list[np.ndarray]:
+        """Return ∂²Π_t/∂z∂q (3 + k, dof) of each energy of rigid tools."""
+        state, result, couplings = self._at(z), self._field.state.vec.CreateVector(), []
+        for _, part, shifts, form in self._shifted:
             form.AssembleLinearization(state)
-            for row, shift in zip(coupling[rows], part.shifts, strict=False):  # type: ignore[arg-type]  # they have shifts
+            coupling = np.zeros((len(part.parameters), len(z)))
+            for row, shift in zip(coupling, shifts, strict=False):
                 other = self._at(shift)
                 result.data = form.mat * other
                 row -= result.FV().NumPy()
             if part.rates is not None:
-                coupling[rows][3:] += self._by_angles(part, partial(self._slope, form, state))
-        return coupling
+                coupling[3:] += self._by_angles(part, partial(self._slope, form, state))
+            couplings.append(coupling)
+        return couplings
 
-    def _input_hessian(self, z: np.ndarray, coupling: np.ndarray) -> np.ndarray:
-        """Return ∂²Π/∂q∂q (n, n); `coupling` (n, dof) is ∂²Π/∂z∂q without the lifts."""
+    def _input_hessian(self, z: np.ndarray, tools: list[np.ndarray]) -> np.ndarray:
+        """Return ∂²Π/∂q∂q (n, n); `tools` are the couplings (3 + k, dof) of rigid tools' energies."""
         state, own = self._at(z), np.zeros((self.size, self.size))
         for (i, j), forms in self._second.items():
             own[i, j] = own[j, i] = sum(form.Energy(state) for form in forms)
-        for rows, part, form in self._shifted:
-            by_place = -coupling[rows] @ part.shifts.T  # type: ignore[union-attr]  # they have shifts
+        for (rows, part, shifts, form), coupling in zip(self._shifted, tools, strict=True):
+            by_place = -coupling @ shifts.T
             by_angles = np.empty((0, len(by_place)))
             if part.rates is not None:
-                by_angles = self._by_angles(part, partial(self._tool_gradient, part, form, z))
-            own[rows, rows] = np.hstack([by_place, by_angles.T])
+                by_angles = self._by_angles(part, partial(self._tool_gradient, part, shifts, form, z))
+            own[rows, rows] += np.hstack([by_place, by_angles.T])
         return own
 
     def _lift_forces(self, system: System) -> np.ndarray:

@@ -93,6 +93,8 @@ class Baseline(ABC):
         How far beyond each trained range ℓ is followed, as a share of the range.
     further_share : float
         Weight of what is known by further inputs, beside that of energy and force.
+    forces : int
+        How many inputs after the felt ones have forces in N that count as the hand's do, such as the effort of jaws.
     force_floor : float
         Least force, as a share of the largest, relative to which errors of the force count.
     ridge : float
@@ -103,6 +105,7 @@ class Baseline(ABC):
     holds: ClassVar[bool] = False
     share: ClassVar[float] = 0.25
     further_share: ClassVar[float] = 1.0
+    forces: ClassVar[int] = 0
     force_floor: ClassVar[float] = 0.0
     ridge: ClassVar[float] = 3e-6
 

@@ -33,10 +33,10 @@ PP_PART void posed_turn(const pp_model *m, const pp_real *angles, pp_real *turn)
   }
 }
 
-/* mean depth s at a place in an orientation, -ds/dx and -d2s/dx2; the least gap where all balls miss */
-PP_PART pp_real posed_depth(const pp_model *m, const pp_real *x, const pp_real *turn, pp_real *slope, pp_real *bend) {
+/* mean depth s of balls at a place in an orientation, -ds/dx and -d2s/dx2; the least gap where all balls miss */
+PP_PART pp_real posed_depth_of(const pp_model *m, const pp_array *balls, const pp_real *x, const pp_real *turn, pp_real *slope,
+                               pp_real *bend) {
   const pp_real *own = pp_baseline_array(m, 0)->real, order = own[5], scale = own[6];
-  const pp_array *balls = pp_baseline_array(m, 4);
   pp_real total = R(0), nearest = -pp_infinity(), at[3], n[3], D[9], mean, factor;
   int32_t k;
   int i, j;
@@ -66,6 +66,10 @@ PP_PART pp_real posed_depth(const pp_model *m, const pp_real *x, const pp_real *
     for (j = 0; j < 3; j++) bend[3 * i + j] = factor * bend[3 * i + j] + (order - R(1)) / (mean * scale) * slope[i] * slope[j];
   }
   return scale * mean;
+}
+
+PP_PART pp_real posed_depth(const pp_model *m, const pp_real *x, const pp_real *turn, pp_real *slope, pp_real *bend) {
+  return posed_depth_of(m, pp_baseline_array(m, 4), x, turn, slope, bend);
 }
 
 PP_PART int posed_enter(const pp_model *m, const pp_real *x, const pp_real *p, pp_work *w) {

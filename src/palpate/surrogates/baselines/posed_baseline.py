@@ -40,10 +40,9 @@ from palpate.surrogates.energy_kernels import (
     Compiled,
 )
 from palpate.surrogates.surface import distance_into
-from palpate.tools import front_balls
 from palpate.units import Range
 
-__all__ = ["PosedBaseline"]
+__all__ = ["ROWS", "TURN", "PosedBaseline", "depth_into", "depths_into"]
 
 ANGLE_STEP = 1e-4  # rad, of the differences by angles
 _ORDER, _SCALE = 5, 6  # places in the numbers, after those of a contact and its step
@@ -79,9 +78,7 @@ class PosedBaseline(ToolBaseline):
     @cached_property
     def balls(self) -> np.ndarray:
         """Centres in the tool's frame from its place, radius, both in m, and share (b, 5) of each ball of its front."""
-        balls = front_balls(self.posed_tool.shape)
-        balls[:, 2] += self.posed_tool.shape.front
-        return balls
+        return self.posed_tool.balls
 
     @property
     def inner(self) -> float:
@@ -102,10 +99,14 @@ class PosedBaseline(ToolBaseline):
         return Compiled(None, self._arguments(), enter=_enter_posed, leave=_leave_posed)
 
     def _arguments(self) -> tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray, np.ndarray]:
-        own, step = self.posed_tool, STEP * self.probe_radius
-        numbers = np.array([*self.law.numbers(), self.probe_radius, step, self.order, own.shape.size])
+        own = self.posed_tool
         turn = np.eye(3) if own.turn is None else np.ascontiguousarray(own.turn)
-        return numbers, self.touched.compiled(), self.balls, turn, np.zeros((_ROWS, 3, 3))
+        return self._numbers(), self.touched.compiled(), self.balls, turn, np.zeros((ROWS, 3, 3))
+
+    def _numbers(self) -> np.ndarray:
+        """Return the law's three numbers, the tool's size and a step in m, the mean's order, and its scale in m."""
+        step, scale = STEP * self.probe_radius, self.posed_tool.shape.size
+        return np.array([*self.law.numbers(), self.probe_radius, step, self.order, scale])
 
     @property
     def c_name(self) -> str:
@@ -139,7 +140,7 @@ class PosedBaseline(ToolBaseline):
         """Return s (N,) in m, −∂s/∂p (N, 3) and −∂²s/∂p² (N, 3, 3) at inputs X (N, n)."""
         X = np.ascontiguousarray(X, dtype=np.float64)
         s, slope, bend = np.empty(len(X)), np.empty((len(X), 3)), np.empty((len(X), 3, 3))
-        for_rows(_depths_into, len(X))(X, s, slope, bend, *self._arguments())
+        for_rows(depths_into, len(X))(X, s, slope, bend, *self._arguments())
         return s, slope, bend
 
     def logarithm(
@@ -157,14 +158,14 @@ class PosedBaseline(ToolBaseline):
         return value, gradient, hessian
 
 
-_ROWS = 4  # matrices of scratch: a rotation, its factor, a ball's bend, and vectors
-_TURN, _FACTOR, _BALL_BEND, _LINES = range(_ROWS)
+ROWS = 4  # matrices of scratch: a rotation, its factor, a ball's bend, and vectors
+TURN, _FACTOR, _BALL_BEND, _LINES = range(ROWS)
 
 
 @part
 def _turn_into(angles, own, scratch) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Put R = exp [w]× R₀ into scratch, w the angles, its last component 0 where there are two."""
-    w, R, K = scratch[_LINES, 0], scratch[_TURN], scratch[_FACTOR]
+    w, R, K = scratch[_LINES, 0], scratch[TURN], scratch[_FACTOR]
     square = 0.0
     for i in range(3):
         w[i] = angles[i] if i < angles.size else 0.0
@@ -189,9 +190,9 @@ def _turn_into(angles, own, scratch) -> None:  # type: ignore[no-untyped-def]  #
 
 
 @part
-def _depth_into(place, slope, bend, numbers, surface, balls, scratch):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def depth_into(place, slope, bend, numbers, surface, balls, scratch):  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Mean depth s at a place (3,) in the orientation in scratch, −∂s/∂p and −∂²s/∂p²; the least gap where all miss."""
-    R, D, at, n = scratch[_TURN], scratch[_BALL_BEND], scratch[_LINES, 1], scratch[_LINES, 2]
+    R, D, at, n = scratch[TURN], scratch[_BALL_BEND], scratch[_LINES, 1], scratch[_LINES, 2]
     order, scale = numbers[_ORDER], numbers[_SCALE]
     total, nearest = 0.0, -math.inf
     slope[:] = 0.0
@@ -224,11 +225,11 @@ def _depth_into(place, slope, bend, numbers, surface, balls, scratch):  # type: 
 
 
 @kernel
-def _depths_into(X, depths, slopes, bends, numbers, surface, balls, turn, scratch) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+def depths_into(X, depths, slopes, bends, numbers, surface, balls, turn, scratch) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     """Mean depths and derivatives at rows X (N, 3 + k)."""
     for row in range(X.shape[0]):
         _turn_into(X[row, 3:], turn, scratch)
-        depths[row] = _depth_into(X[row, :3], slopes[row], bends[row], numbers, surface, balls, scratch)
+        depths[row] = depth_into(X[row, :3], slopes[row], bends[row], numbers, surface, balls, scratch)
 
 
 @part
@@ -236,7 +237,7 @@ def _enter_posed(position, parameters, moved, base, small, numbers, args):  # ty
     """Fill the law's energy and derivatives; move the place at which ℓ is asked to the saturated depth."""
     own, surface, balls, turn, scratch = args
     _turn_into(parameters, turn, scratch)
-    s = _depth_into(position, small[VECTORS, OUTWARD], small[SURFACE], own, surface, balls, scratch)
+    s = depth_into(position, small[VECTORS, OUTWARD], small[SURFACE], own, surface, balls, scratch)
     return fill_law(s, moved, base, small, numbers, own)
 
 
@@ -254,7 +255,7 @@ def _leave_posed(position, base, small, numbers, args) -> None:  # type: ignore[
         for many, weight in ((1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)):
             for i in range(3):
                 place[i] = position[i] + many * step * g[i] / size
-            _depth_into(place, unused, other, own, surface, balls, scratch)
+            depth_into(place, unused, other, own, surface, balls, scratch)
             for i in range(3):
                 for j in range(3):
                     small[BEND, i, j] += weight * size / (12.0 * step) * other[i, j]

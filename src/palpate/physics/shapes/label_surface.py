@@ -10,7 +10,7 @@ the volume of its voxels again.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,9 @@ __all__ = ["LabelSurface", "label_surface"]
 SMOOTH_VOXEL, SMOOTH_LATTICE = 0.85, 0.35
 EVEN, EXACT = 8, 4  # rounds that spread the vertices and step back to the surface, and of these steps alone
 WITHIN = 0.45  # of the lattice's spacing: a vertex stays in its cube, so that surfaces don't cut each other
-FAIR = 2.5  # voxels: waves of about four times this length are halved where terraces are removed
+FAIR = 2.0  # voxels: waves of 2π times this length are halved where terraces are removed
+STEEP = 3.0  # largest cotangent of a triangle's angle: slivers would else hold their corners
+LEAST_SHARE = 0.05  # of a lattice square: least area around a vertex, against slivers
 SHIFTS, MOST_SHIFT = (
     6,
     0.1,
@@ -125,6 +127,12 @@ class _Lattice:
                 )
         return value
 
+    def is_at_end(self, places: np.ndarray) -> np.ndarray:
+        """Return which places (n, 3) in steps of the lattice lie within a step of the end of the image."""
+        along = (self.first + self.spacing * places) / self.image.spacing + 0.5  # voxels from its corner
+        near = self.spacing / self.image.spacing
+        return np.asarray(((along < near) | (along > self.image.labels.shape - near)).any(axis=1))
+
     def to_metres(self, places: np.ndarray) -> np.ndarray:
         """Return where places (n, 3) in steps of the lattice are, in m."""
         return np.asarray(self.image.origin + (self.first + self.spacing * places) @ self.image.axes.T)
@@ -200,26 +208,65 @@ def _settle(
             places = places + _newton(lattice, places, present, fresh, count)
             places = np.clip(places, centres - WITHIN, centres + WITHIN)
     voxel = float(np.prod(lattice.image.spacing)) ** (1 / 3) / lattice.spacing
-    smooth = _without_terraces(places, mean, is_joined, voxel)
-    return _with_volumes(smooth, quads, sides, lattice.volumes)
+    reach = np.where(lattice.is_at_end(places), 0.0, TERRACE * voxel)  # a cut is flat up to its rim
+    bend, share = _curvature(places, _halve(places, quads), mean, is_joined & (count > 2))
+
+    def keep_volumes(moved: np.ndarray) -> np.ndarray:
+        return _with_volumes(moved, quads, sides, lattice.volumes)
+
+    return keep_volumes(_without_terraces(places, bend, share, FAIR * voxel, reach, keep_volumes))
 
 
-def _without_terraces(places: np.ndarray, mean: Any, is_joined: np.ndarray, voxel: float) -> np.ndarray:
-    """Return places (n, 3) on a surface without the steps of the voxels, of `voxel` in steps of the lattice.
+def _curvature(
+    places: np.ndarray, triangles: np.ndarray, mean: Any, is_seam: np.ndarray
+) -> tuple[Any, np.ndarray]:
+    """Return the matrix from places (n, 3) to twice a surface's mean curvature vectors, and the area (n,) of each.
 
-    The surface is the one of least bending that stays near the places, each within half a voxel: a label says no more
-    of where a surface is. Bending, the square of the Laplacian, leaves what is round as it is.
+    It has the cotangents of the triangles (Pinkall and Polthier 1993): the mean over neighbours would see the cubes of
+    the lattice, too, and flatten what is round where it faces an axis. Along lines where three tissues meet it is the
+    second difference.
     """
-    from scipy.sparse import diags_array, eye_array
+    from scipy.sparse import coo_matrix, diags_array, eye_array
+
+    count = len(places)
+    weights: Any = 0.0
+    for k in range(3):
+        i, j, opposite = (triangles[:, (k + turn) % 3] for turn in range(3))
+        u, v = places[i] - places[opposite], places[j] - places[opposite]
+        area = np.linalg.norm(np.cross(u, v), axis=1)  # twice the triangle's
+        cotangent = np.clip(np.einsum("ij,ij->i", u, v) / np.maximum(area, 1e-9), 0.0, STEEP)
+        half = coo_matrix((cotangent / 2, (i, j)), shape=(count, count)).tocsr()
+        weights = weights + half + half.T
+    share = np.bincount(triangles.ravel(), weights=np.repeat(area / 6, 3), minlength=count)
+    share = np.maximum(share, LEAST_SHARE)
+    sheet = diags_array(~is_seam / share) @ (diags_array(np.asarray(weights.sum(axis=1)).ravel()) - weights)
+    return sheet + diags_array(2.0 * is_seam) @ (eye_array(count) - mean), share
+
+
+def _without_terraces(
+    places: np.ndarray,
+    bend: Any,
+    share: np.ndarray,
+    length: float,
+    reach: np.ndarray,
+    keep_volumes: Callable[[np.ndarray], np.ndarray],
+) -> np.ndarray:
+    """Return places (n, 3) on a surface without the steps of the voxels, smooth over a `length` of the lattice.
+
+    The surface is the one of least bending that stays near the places, each within its `reach` (n,), which is half a
+    voxel: a label says no more of where a surface is. Bending, the square of the curvature, leaves what is round as it
+    is but for its volume.
+    """
+    from scipy.sparse import diags_array
     from scipy.sparse.linalg import splu
 
-    bend = diags_array(is_joined.astype(float)) @ (eye_array(len(places)) - mean)
-    solve = splu((eye_array(len(places)) + (FAIR * voxel) ** 4 * bend.T @ bend).tocsc()).solve
+    area = diags_array(share)
+    solve = splu((area + length**4 * bend.T @ area @ bend).tocsc()).solve
     smooth = places
     for _ in range(FAIR_ROUNDS):
-        away = solve(smooth) - places
+        away = keep_volumes(solve(area @ smooth)) - places
         far = np.linalg.norm(away, axis=1, keepdims=True)
-        smooth = places + away * np.minimum(1.0, TERRACE * voxel / np.maximum(far, 1e-12))
+        smooth = places + away * np.minimum(1.0, reach[:, None] / np.maximum(far, 1e-12))
     return smooth
 
 

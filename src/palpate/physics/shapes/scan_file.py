@@ -26,6 +26,7 @@ __all__ = ["LabelImage", "clear_specks", "name_labels", "read_scan"]
 
 MOST_LABELS = 64  # different numbers that a labelmap of tissues has at most; an image of grey values has more
 SPECK = 8  # voxels: pieces of fewer are noise of the segmentation, and no mesh can hold them
+UNCLEAR = np.iinfo(np.int32).min  # stands for no label while specks are given away
 LISTED = 12  # numbers that a message names, at most
 HEAD = 65_536  # bytes at a file's beginning among which its header states the size of a voxel
 # the line by which a header states the size of a voxel; NIfTI's header always has the field
@@ -205,16 +206,22 @@ def clear_specks(image: LabelImage) -> LabelImage:
     """
     from scipy import ndimage
 
-    unclear = np.zeros(image.labels.shape, dtype=bool)
+    unclear = [np.empty((0, 3), dtype=int)]
     told = []
     voxel = float(np.prod(image.spacing))
     for name, number in {**image.names, "": 0}.items():
-        mask = np.pad(image.labels == number, 1, constant_values=number == 0)  # outside all is one piece of 0
+        mask = image.labels == number
+        first = np.zeros(3, dtype=int)
+        if number:  # what surrounds its box can't belong to it
+            box = ndimage.find_objects(mask.astype(np.uint8))[0]
+            mask, first = mask[box], np.array([side.start for side in box])
+        else:  # outside all is one piece of 0
+            mask, first = np.pad(mask, 1, constant_values=True), first - 1
         pieces, count = ndimage.label(mask)
         sizes = np.bincount(pieces.ravel(), minlength=count + 1)[1:]
         small = sizes < min(SPECK, sizes.max())
         if small.any():
-            unclear |= np.isin(pieces[1:-1, 1:-1, 1:-1], 1 + np.flatnonzero(small))
+            unclear.append(np.argwhere(np.concatenate([[False], small])[pieces]) + first)
             what = f"{int(small.sum())} specks of {name!r}" if name else f"{int(small.sum())} pinholes"
             told.append(
                 f"{what} ({int(sizes[small].sum())} voxels in all) were given to what surrounds them."
@@ -232,9 +239,22 @@ def clear_specks(image: LabelImage) -> LabelImage:
                 if name
                 else f"{what}, the largest of {size}; they were kept."
             )
-    if unclear.any():
-        nearest = ndimage.distance_transform_edt(
-            unclear, sampling=image.spacing, return_distances=False, return_indices=True
-        )
-        image = replace(image, labels=image.labels[tuple(nearest)])
-    return image.with_notes(*told)
+    return _give_away(image, np.concatenate(unclear)).with_notes(*told)
+
+
+def _give_away(image: LabelImage, unclear: np.ndarray) -> LabelImage:
+    """Return the image whose unclear voxels (n, 3) have each the label of the nearest clear one, which touches one."""
+    from scipy.spatial import KDTree
+
+    if not len(unclear):
+        return image
+    around = (unclear[:, None] + np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), axis=-1).reshape(-1, 3)).reshape(
+        -1, 3
+    )
+    around = np.unique(around[((around >= 0) & (around < image.labels.shape)).all(axis=1)], axis=0)
+    labels = image.labels.copy()
+    labels[tuple(unclear.T)] = UNCLEAR
+    clear = around[labels[tuple(around.T)] != UNCLEAR]
+    nearest = KDTree(clear * image.spacing).query(unclear * image.spacing)[1]
+    labels[tuple(unclear.T)] = labels[tuple(clear[nearest].T)]
+    return replace(image, labels=labels)

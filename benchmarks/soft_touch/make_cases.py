@@ -1,0 +1,172 @@
+"""Make the folders of soft-touch: shapes, places and the oracle's tables.
+
+    python -m benchmarks.soft_touch.make_cases [--case NAME ...] [--seed N --out FOLDER]
+
+Without a seed the shipped folders are renewed in place: the shapes and places at once, then all solves that
+`solves.csv` does not hold yet, as long as `--minutes` allows; `oracle.csv` follows from `solves.csv`. With a seed,
+other places of the same bodies are solved by palpate alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import shutil
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+
+from benchmarks.soft_touch.bodies import BODIES, RADIUS, SEED, loops_of, paths_of
+from palpate.physics.shapes.mesh import BodyMesh
+from palpate.physics.shapes.meshing import FineMesh
+
+__all__ = ["CASES", "make_places", "write_case"]
+
+CASES = File(__file__).parent / "cases"
+LAW = "W = shear/2 (J^(-2/3) tr(FᵀF) - 3) + bulk/2 (J - 1)^2, J = det F"
+
+
+def write_case(name: str, folder: File) -> None:
+    """Write a body's card and mesh."""
+    soft = BODIES[name]
+    folder.mkdir(parents=True, exist_ok=True)
+    geometry = replace(soft.body.geometry, element=soft.coarse)  # type: ignore[type-var]
+    mesh = geometry.rest((FineMesh(soft.touches, soft.surface),))
+    (folder / "case.toml").write_text(_card(name, mesh), "utf-8")
+    _write_mesh(mesh, folder / "mesh.vtu", soft.body.fixed)
+
+
+def write_places(name: str, seed: int, folder: File) -> None:
+    """Write the presses and loops of a seed."""
+    presses: list[list[Any]] = []
+    for path in paths_of(name, seed):
+        for step, (centre, depth) in enumerate(zip(path.centres, path.depths, strict=True)):
+            row = [f"{value:.9f}" for value in (*centre, *path.normal, depth)]
+            presses.append([len(presses), path.number, step, *row])
+    write_table(folder / "presses.csv", "press,path,step,x,y,z,nx,ny,nz,depth", presses)
+    loops = [
+        [loop, index, *(f"{value:.9f}" for value in point)]
+        for loop, points in enumerate(loops_of(name, seed))
+        for index, point in enumerate(points)
+    ]
+    write_table(folder / "loops.csv", "loop,index,x,y,z", loops)
+
+
+def make_places(name: str, seed: int, folder: File) -> None:
+    """Write a whole case with the places of another seed, solved by palpate alone, in some minutes."""
+    from benchmarks.soft_touch.oracle import solve_paths, write_oracle
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for part in ("case.toml", "mesh.vtu"):
+        shutil.copy(CASES / name / part, folder / part)
+    write_places(name, seed, folder)
+    solve_paths(name, seed, folder, until=np.inf)
+    write_oracle(folder, reference=CASES / name)
+
+
+def write_table(file: File, header: str, rows: Iterable[Sequence[Any]]) -> None:
+    """Write a table with commas."""
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(header.split(","))
+        writer.writerows(rows)
+
+
+def _card(name: str, mesh: BodyMesh) -> str:
+    soft = BODIES[name]
+    lines = [
+        f'title = "{soft.title}"',
+        'units = "SI: m, N, Pa, J"',
+        f'shape = "{soft.shape}"',
+        'contact = "rigid ball, frictionless, quasi-static"',
+        f'support = "the surface {" and ".join(soft.body.fixed)}: nodes with fixed = 1 in mesh.vtu"',
+        'source = "benchmarks/soft_touch/bodies.py"',
+        "",
+        "[ball]",
+        f"radius = {RADIUS}",
+    ]
+    # in the order of the mesh's labels
+    for label in mesh.regions:
+        law = soft.body.materials[label]
+        lines += [
+            "",
+            f"[materials.{label}]",
+            'law = "neo-Hookean"',
+            f"shear = {law.shear_modulus:.8g}",
+            f"bulk = {law.bulk_modulus:.8g}",
+            f"young = {law.young:g}",
+            f"poisson = {law.poisson:g}",
+            f'energy = "{LAW}"',
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _write_mesh(mesh: BodyMesh, file: File, fixed: Iterable[str]) -> None:
+    """Write tetrahedra as a VTU file in words, which a reader of twenty lines can read."""
+    held = np.zeros(len(mesh.points), dtype=int)
+    for surface in fixed:
+        held[np.unique(mesh.triangles_of(surface))] = 1
+    nodes, cells = len(mesh.points), len(mesh.tetrahedra)
+    point = "\n".join(" ".join(f"{value:.7g}" for value in row) for row in mesh.points)
+    corners = "\n".join(" ".join(map(str, row)) for row in mesh.tetrahedra.tolist())
+    text = f"""<?xml version="1.0"?>
+<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">
+<UnstructuredGrid><Piece NumberOfPoints="{nodes}" NumberOfCells="{cells}">
+<Points><DataArray type="Float64" Name="Points" NumberOfComponents="3" format="ascii">
+{point}
+</DataArray></Points>
+<Cells><DataArray type="Int32" Name="connectivity" format="ascii">
+{corners}
+</DataArray><DataArray type="Int32" Name="offsets" format="ascii">
+{" ".join(str(4 * (k + 1)) for k in range(cells))}
+</DataArray><DataArray type="UInt8" Name="types" format="ascii">
+{" ".join(["10"] * cells)}
+</DataArray></Cells>
+<PointData><DataArray type="Int32" Name="fixed" format="ascii">
+{" ".join(map(str, held.tolist()))}
+</DataArray></PointData>
+<CellData><DataArray type="Int32" Name="label" format="ascii">
+{" ".join(map(str, mesh.region_of.tolist()))}
+</DataArray></CellData>
+</Piece></UnstructuredGrid></VTKFile>
+"""
+    file.write_text(text, "utf-8")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write folders, solve, and join."""
+    from benchmarks.soft_touch.oracle import solve_calculix, solve_paths, write_oracle
+
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.soft_touch.make_cases", description=__doc__.split("\n")[0]
+    )
+    parser.add_argument("--case", nargs="+", choices=BODIES, default=list(BODIES))
+    parser.add_argument("--seed", type=int, help="makes other places, in the folder of --out")
+    parser.add_argument("--out", type=File, help="folder of the other places")
+    parser.add_argument("--minutes", type=float, default=np.inf, help="no solve begins later")
+    parser.add_argument("--shapes", action="store_true", help="write shapes and places only")
+    parser.add_argument("--calculix", action="store_true", help="solve by CalculiX (ccx) only")
+    options = parser.parse_args(arguments)
+    if (options.seed is None) != (options.out is None):
+        parser.error("--seed and --out belong together: the shipped folders keep the published seed")
+    until = time.monotonic() + 60 * options.minutes
+    for name in options.case:
+        folder = CASES / name
+        if options.seed is not None:
+            make_places(name, options.seed, options.out / name)
+        elif options.shapes:
+            write_case(name, folder)
+            write_places(name, SEED, folder)
+        else:
+            (solve_calculix if options.calculix else solve_paths)(name, SEED, folder, until=until)
+            write_oracle(folder)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -35,7 +35,7 @@ __all__ = ["Observer", "block", "tables"]
 
 PRESSED, DEPTHS = 44, 2  # presses that the body is learnt from, and their depths at each place
 DEPTH = 0.0085  # m, of every press of an examination: the fingertip is pressed with more than 1 N
-LATTICE = (5, 5)  # places along x and y, over the box that is touched
+LATTICE = (4, 4)  # places along x and y, over the box that is touched
 MOST, FEW = 30, 12  # presses of an examination, and to locate a lump that is there
 FALSE_ALARMS = 0.05
 STRONG, FAINT, ONE = 0.07, 0.10, 1.0  # relative noise from 1 N on and below, N
@@ -45,7 +45,7 @@ COVER = 0.010  # m of tissue over a lump
 HARD = 10.0  # modulus of the hidden lump over the tissue's
 PUBLISHED = ((10.0, 0.78), (3.0, 0.38))  # mm and share that people found
 SIZES = (15.0, 12.0, 10.0, 8.0, 5.0, 3.0)  # diameters in mm
-PLACES = ((0.028, 0.028), (0.0245, 0.031))  # m, above which the lumps of finite elements lie
+PLACES = ((0.028, 0.028), (0.0243, 0.031))  # m, above which the lumps of finite elements lie
 RADII, SPACING = (0.004, 0.0055, 0.0075), 0.0045  # m, of the lumps that the observer thinks of
 
 
@@ -241,7 +241,7 @@ def tables(*, quick: bool = False) -> list[Table]:
     with tempfile.TemporaryDirectory() as folder:
         body = learnt_block(Path(folder), quick)
     X = lattice_of(block())
-    X = X[:: 6 if quick else 1]
+    X = X[:: 5 if quick else 1]
     return measure(body, X, solved_forces(X, [hidden_lump(place, SIZES[0]) for place in PLACES]), quick)
 
 

@@ -45,7 +45,9 @@ COVER = 0.010  # m of tissue over a lump
 HARD = 10.0  # modulus of the hidden lump over the tissue's
 PUBLISHED = ((10.0, 0.78), (3.0, 0.38))  # mm and share that people found
 SIZES = (15.0, 12.0, 10.0, 8.0, 5.0, 3.0)  # diameters in mm
-PLACES = ((0.028, 0.028), (0.0245, 0.031))  # m, above which the lumps of finite elements lie
+MIDDLE = (0.028, 0.028)  # m: the lumps of finite elements lie below it, as the block is pressed about it
+BESIDE = (0.0252, 0.0308)  # m: further lumps of the learnt body lie below it, half-way between four presses
+SOLVED = (15.0, 10.0)  # diameters in mm of the lumps of finite elements
 RADII, SPACING = (0.004, 0.0055, 0.0075), 0.0045  # m, of the lumps that the observer thinks of
 
 
@@ -70,7 +72,7 @@ def learnt_block(folder: Path, quick: bool) -> Surrogate:
     problem = block()
     points = problem.design(PRESSED, 1, depths=DEPTHS)[:: 4 if quick else 1]
     data = pp.sweep(problem, points=points, workers=1, path=folder / f"lumps-{len(points)}.zarr")
-    return pp.learn(data, effort=0.15)[0]
+    return pp.learn(data, effort=0.1, workers=1)[0]
 
 
 def lattice_of(problem: pp.LumpProblem) -> np.ndarray:
@@ -178,23 +180,27 @@ class Observer:
         return float(np.quantile(logs, 1 - FALSE_ALARMS))
 
 
-def solved_forces(X: np.ndarray, lumps: Sequence[pp.Lump]) -> np.ndarray:
-    """Return forces (1 + H, P) along z by finite elements without a lump and with each, N."""
-    solver = block().open()
-    forces = np.full((1 + len(lumps), len(X)), np.nan)
-    for p, x in enumerate(X):
-        print(f"press {p + 1} of {len(X)}", file=sys.stderr)
-        free = solver.press(x)
-        forces[0, p] = free.response[2]
-        for h, lump in enumerate(lumps, 1):
-            forces[h, p] = free.response[2] + solver.press_with(free, lump).force[2]
+def solved_forces(X: np.ndarray) -> np.ndarray:
+    """Return forces (1 + S, P) along z by finite elements, N: without a lump, and with one of each solved size.
+
+    The lump lies below the middle of a square block: presses that mirror each other have the same force, solved once.
+    """
+    solver, lumps = block().open(), [hidden_lump(MIDDLE, size) for size in SOLVED]
+    away = np.sort(np.abs(X[:, :2] - MIDDLE), axis=1).round(6)
+    distinct, index = np.unique(away, axis=0, return_inverse=True)
+    forces = np.full((1 + len(lumps), len(distinct)), np.nan)
+    for p, offset in enumerate(distinct):
+        print(f"press {p + 1} of {len(distinct)}", file=sys.stderr)
+        free = solver.press((*(np.array(MIDDLE) - offset), X[0, 2]))
+        changes = [solver.press_with(free, lump).force[2] for lump in lumps]
+        forces[:, p] = free.response[2] + np.array([0.0, *changes])
     if np.isnan(forces).any():
         raise SolverError(
             f"{np.isnan(forces).sum()} presses of the examined block have no solution.",
             why="The body folds under the probe.",
             fix="Press less deep.",
         )
-    return forces
+    return forces[:, index.ravel()]
 
 
 def location_errors(
@@ -226,13 +232,13 @@ def sized_truths(body: Surrogate, X: np.ndarray, solved: np.ndarray) -> dict[flo
     plain, astray = (rows[0] for rows in learnt_forces(body, [None], X))
     least, truths = 2e3 * body.lumps.room.radius.low, {}
     for size in SIZES:
-        lumps = [hidden_lump(place, max(size, least)) for place in PLACES]
+        lumps = [hidden_lump(place, max(size, least)) for place in (MIDDLE, BESIDE)]
         forces, doubts = learnt_forces(body, lumps, X)
         part = min(size / least, 1.0) ** 3
         doubts = astray + part * (doubts - astray)
         truths[size] = {"learnt body": Felt.of(plain + part * (forces - plain), doubts)}
-        if size == SIZES[0]:
-            truths[size]["finite elements"] = Felt.of(solved[1:], doubts)
+        if size in SOLVED:
+            truths[size]["finite elements"] = Felt.of(solved[[1 + SOLVED.index(size)]], doubts[:1])
     return truths
 
 
@@ -242,7 +248,7 @@ def tables(*, quick: bool = False) -> list[Table]:
         body = learnt_block(Path(folder), quick)
     X = lattice_of(block())
     X = X[:: 6 if quick else 1]
-    return measure(body, X, solved_forces(X, [hidden_lump(place, SIZES[0]) for place in PLACES]), quick)
+    return measure(body, X, solved_forces(X), quick)
 
 
 def measure(body: Surrogate, X: np.ndarray, solved: np.ndarray, quick: bool) -> list[Table]:
@@ -265,8 +271,8 @@ def measure(body: Surrogate, X: np.ndarray, solved: np.ndarray, quick: bool) -> 
         for size, kinds in truths.items()
         for name, felt in kinds.items()
     ]
-    largest = truths[SIZES[0]]
-    solved_change, learnt_change = solved[1:] - solved[0], largest["learnt body"].force - none.force
+    learnt = np.array([truths[size]["learnt body"].force[0] for size in SOLVED])
+    solved_change, learnt_change = solved[1:] - solved[0], learnt - none.force
     counts = np.abs(solved_change) > LEAST_CONTRAST * solved[0]
     contrast = np.quantile(np.abs(learnt_change / solved_change - 1)[counts], [0.5, 0.95])
     found = next(row["found"] for row in rows if row["truth"] == "finite elements")
@@ -294,18 +300,15 @@ def measure(body: Surrogate, X: np.ndarray, solved: np.ndarray, quick: bool) -> 
                 "(Fletcher et al. 1985, JAMA 253, 2224); in a later study 78 and 38 %.",
             ],
         ),
-        _located(body, X, solved, largest["finite elements"], count, quick),
+        _place_table(body, X, truths[SIZES[0]]["finite elements"], count, quick),
     ]
 
 
-def _located(
-    body: Surrogate, X: np.ndarray, solved: np.ndarray, truths: Felt, count: int, quick: bool
-) -> Table:
+def _place_table(body: Surrogate, X: np.ndarray, truths: Felt, count: int, quick: bool) -> Table:
     """Return how well lumps of finite elements are located by an observer who knows that there is one."""
     lumps = lumps_of(body, (SIZES[0] / 2e3,), 0.003)
     finder = Observer(Felt.of(*learnt_forces(body, [None, *lumps], X)))
-    hidden = [hidden_lump(place, SIZES[0]) for place in PLACES]
-    rows = []
+    hidden, rows = [hidden_lump(MIDDLE, SIZES[0])], []
     for name, chosen in (("chosen by the observer's variance", True), ("random", False)):
         errors = location_errors(finder, lumps, truths, hidden, count, chosen=chosen)
         median, p95 = np.quantile(errors, [0.5, 0.95])

@@ -193,7 +193,7 @@ def tables(*, quick: bool) -> list[Table]:
         _plans(people, quick),
         _saved(people, quick),
         _equivalence(10 if quick else 200, quick),
-        _ratings(4 if quick else 300, quick),
+        _ratings(4 if quick else 200, quick),
     ]
 
 

@@ -1,4 +1,4 @@
-"""Plans of experiments on simulated people: coverage, bias, trials saved by adaptive placement, and equivalence.
+"""Plans of experiments on simulated people: coverage, bias, trials saved by adaptive placement, equivalence, ratings.
 
     python -m benchmarks.experiment_plans [--quick] [--record]
 
@@ -29,7 +29,8 @@ from palpate.experiments import (
     simulate_course,
 )
 from palpate.experiments.psychometric import Estimate
-from palpate.experiments.simulation import simulate_people
+from palpate.experiments.ratings import cumulative_logit
+from palpate.experiments.simulation import simulate_people, simulate_raters
 
 __all__ = ["tables"]
 
@@ -41,6 +42,8 @@ TIRED = "adaptive, 100; σ 30 % larger at first and at last"
 _TRIALS = 140
 _SAVED = 0.7  # share of the trials of constant stimuli
 _GROUP = 12
+_RATED = 4  # ratings of each body by each rater
+_EFFECTS = (0.7, -0.8, 0.4)  # logits
 
 
 def _courses() -> dict[str, tuple[Course, Observer]]:
@@ -155,10 +158,43 @@ def _equivalence(groups: int, quick: bool) -> Table:
     return Table("experiment_equivalence", title, columns, rows, [] if quick else claims)
 
 
+def _ratings(studies: int, quick: bool) -> Table:
+    """Return how often the ordinal model's intervals hold the true effects on simulated raters, experts apart."""
+    names = ("experts apart from others", "other body, rated by others", "other body, rated by experts")
+    rng, rows = np.random.default_rng(5), list[dict[str, Any]]()
+    drawn = [simulate_raters(rng, _GROUP, _RATED, _EFFECTS) for _ in range(studies)]
+    effects = np.stack([cumulative_logit(*study, 2)[0] for study in drawn])
+    for k, (name, true) in enumerate(zip(names, _EFFECTS, strict=True)):
+        low, middle, high = effects[:, k].T
+        covers = 100.0 * float(((low <= true) & (true <= high)).mean())
+        rows.append({"effect": name, "true": true, "covers": covers, "bias": float(middle.mean()) - true})
+    columns = (
+        Column("effect", "effect"),
+        Column("true", "true, logits", "+.1f"),
+        Column("covers", "covers it, %", ".1f"),
+        Column("bias", "bias, logits", "+.3f"),
+    )
+    notes = (
+        f"{_GROUP} raters a study, half of them experts, who rate both bodies {_RATED} times",
+        f"people differ by 1 logit; {studies} simulated studies; intervals of 95 %",
+    )
+    away = max(abs(row["covers"] - 95.0) for row in rows)
+    claims = [
+        Claim("coverage off 95 %", (away,), 2.0 + round(200.0 * (0.05 * 0.95 / studies) ** 0.5, 1), ".1f")
+    ]
+    title = f"Ordinal model of ratings{quick_mark(quick)}"
+    return Table("experiment_ratings", title, columns, rows, [] if quick else claims, notes)
+
+
 def tables(*, quick: bool) -> list[Table]:
-    """Return the tables of plans, of trials saved, and of the equivalence test."""
+    """Return the tables of plans, of trials saved, of the equivalence test, and of ratings."""
     people = 50 if quick else 1000
-    return [_plans(people, quick), _saved(people, quick), _equivalence(10 if quick else 200, quick)]
+    return [
+        _plans(people, quick),
+        _saved(people, quick),
+        _equivalence(10 if quick else 200, quick),
+        _ratings(4 if quick else 200, quick),
+    ]
 
 
 if __name__ == "__main__":

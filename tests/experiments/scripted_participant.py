@@ -30,7 +30,7 @@ class Sitting:
     """`palpate experiment run` in a process of its own, and its two pages in a browser."""
 
     def __init__(self, browser, plan: Path, *options: str, label: str = "sub-01") -> None:
-        self.felt: dict[int, float] = {}  # largest force on the page's bar, by interval of the trial
+        self.felt: dict[int, float] = {}  # the stiffness that the page's bars show, by interval of the trial
         command = [sys.executable, "-m", "palpate", "experiment", "run", plan.name, label, "--no-browser"]
         self.process = subprocess.Popen(
             [*command, "--port", "0", *options], cwd=plan.parent, stderr=subprocess.PIPE, text=True
@@ -60,7 +60,7 @@ class Sitting:
     def act(self, trials: int, *, press: bool, seconds: float = 200.0, answer=lambda felt: 2) -> None:
         """Answer so many trials, then stop in the middle of a touch; at the end of the sitting, at once.
 
-        `answer` gives an answer to the forces that the page showed; where it asks for ratings, those are given in turn.
+        `answer` gives an answer to the stiffness that the page showed; ratings that it asks for are given in turn.
         """
         answered, until = 0, time.monotonic() + seconds
         while time.monotonic() < until:
@@ -90,13 +90,16 @@ class Sitting:
         raise AssertionError(f"still {self.phase} after {answered} answers")
 
     def _feel(self) -> None:
-        """Look at the bar of the force until the touch is over; a press that came too late is tried again."""
+        """Look at the bars, deepest at last, until the touch is over; a press that came too late is tried again."""
+        self._reached = 0.0
         until = time.monotonic() + 5.0
         while self.phase == "touch" and time.monotonic() < until:
             second = self.page.inner_text("#which").startswith("Second")
-            height = self.page.evaluate("parseFloat(document.querySelector('#force i').style.height) || 0")
-            interval = 2 if second else 1
-            self.felt[interval] = max(self.felt.get(interval, 0.0), height)
+            depth, force = self.page.evaluate(
+                "['#depth i', '#force i'].map((bar) => parseFloat(document.querySelector(bar).style.height) || 0)"
+            )
+            if depth > self._reached:  # a ball's force grows with depth to the power of 3/2 (Hertz)
+                self._reached, self.felt[2 if second else 1] = depth, force / depth**1.5
             time.sleep(0.03)
 
     def _rate(self) -> None:

@@ -214,7 +214,8 @@ def test_a_haply_examines_and_is_felt_again_bit_for_bit(tmp_path):
 
 @pytest.mark.full
 @pytest.mark.timeout(400)
-def test_an_examination_in_a_browser_survives_a_kill(tmp_path, chromium):
+@pytest.mark.parametrize("device", ["page", "haply"])
+def test_an_examination_in_a_browser_survives_a_kill(device, tmp_path, chromium):
     from playwright.sync_api import sync_playwright
 
     file = pressed.surrogate().save(tmp_path / "slab.palpate")
@@ -231,6 +232,11 @@ def test_an_examination_in_a_browser_survives_a_kill(tmp_path, chromium):
         pytest.fail("it did not start")
 
     def press_and_mark(number: int) -> None:
+        if device == "haply":  # its hand presses up and down: a mark is taken where it is
+            page.wait_for_selector("#exam-mark:enabled")
+            page.keyboard.press("m")
+            page.wait_for_selector(f"#exam-marks li:nth-child({number})")
+            return
         x, y = map(float, page.evaluate("document.documentElement.dataset.middle").split())
         page.mouse.move(x, y)
         for _ in range(30):  # on a busy machine the hand falls silent, and has to take hold again
@@ -245,6 +251,10 @@ def test_an_examination_in_a_browser_survives_a_kill(tmp_path, chromium):
         page.wait_for_selector(f"#exam-marks li:nth-child({number})")
 
     with contextlib.ExitStack() as stack, sync_playwright() as playwright:
+        if device == "haply":
+            settings = SimulatorSettings(port=0, events=0, amplitude=-0.02, frequency=0.5)
+            service = stack.enter_context(HaplySimulator(settings))
+            command += ["--device", f"haply:ws://localhost:{service.port},events={service.events_port}"]
         browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
         page = browser.new_page()
         page.set_default_timeout(90_000)

@@ -21,6 +21,8 @@ All of it was tried on simulated observers and scripted participants only.
     groups             random effects, equivalence, power
     experiment_plan    the plan, a TOML file         ready_plans  plans to be filled in
     outlook            what a plan can show          analysis     what people said
+    ratings            statements that were rated, by an ordinal model
+    recorded_presses   the full model's presses  analysis_picture functions and people, drawn
     sitting            a sitting as a value          study_folder its files
     stimuli            the bodies that are felt      conductor    leads a live sitting
     live_sitting       opens all that one needs      experiment_pages, pages/  the two pages

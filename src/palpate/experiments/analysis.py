@@ -105,7 +105,8 @@ class Analysis:
             f"  group {g.condition}, {m.people} people: {self._shown((m.low, m.mean, m.high))} (random effects)"
         ]
         if self.plan.question == "discrimination":
-            low, mean, high = (np.expm1(np.exp(x)) for x in (s.low, s.mean, s.high))
+            with np.errstate(over="ignore"):  # of two people the end may be beyond all numbers
+                low, mean, high = np.expm1(np.exp([s.low, s.mean, s.high]))
             lines.append(f"    Weber fraction {mean:.1%} ({low:.1%} … {high:.1%})")
         if g.same is not None:
             verdict = "shown" if g.same.holds(self.plan.wanted.level) else "not shown"

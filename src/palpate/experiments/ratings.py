@@ -5,8 +5,8 @@
 αₑ is the intercept of an expertise e, βₑ꜀ what a body c adds to the reference among people of that expertise: exp(β) is
 the ratio of the odds of a higher rating. u is integrated by Gauss–Hermite quadrature, and the likelihood maximized.
 Two weak penalties keep it finite: ln τ keeps τ off zero (Chung et al. 2013), and α and β are normal with σ = 5, where
-all ratings are apart. Intervals of 95 % are Wald's, with Student's t of as many degrees of freedom as there are people
-beyond groups.
+all ratings are apart. Intervals of 95 % are Wald's: of α, which is between people, with Student's t of as many degrees
+of freedom as there are people beyond groups; of β, which is within people, normal.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import expit, logsumexp
+from scipy.special import expit, logsumexp, ndtri
 from scipy.stats import t as student
 
 __all__ = ["RatingResult", "cumulative_logit", "rate"]
@@ -88,7 +88,9 @@ def cumulative_logit(counts: np.ndarray, design: np.ndarray, groups: int = 1) ->
     covariance = np.linalg.pinv(_second_differences(loss, z), hermitian=True)
     rows = slice(cuts, cuts + k)
     deviation = np.sqrt(np.maximum(np.diag(covariance)[rows], 0.0))
-    half = float(student.ppf(0.975, max(len(counts) - groups, 1))) * deviation
+    between = np.ptp(design, axis=1).max(axis=0) == 0.0
+    quantile = np.where(between, student.ppf(0.975, max(len(counts) - groups, 1)), ndtri(0.975))
+    half = quantile * deviation
     return np.stack([z[rows] - half, z[rows], z[rows] + half], axis=1), float(np.exp(z[-1]))
 
 

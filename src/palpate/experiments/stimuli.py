@@ -156,7 +156,7 @@ class Stimuli:
             if (cover := place_of(body, lump).cover) < LEAST_COVER:
                 raise UsageError(
                     f"A lump of {1e3 * radius:.3g} mm leaves the skin at vary.place.",
-                    why=f"{1e3 * cover:.2g} mm of tissue cover it, and {1e3 * LEAST_COVER:g} mm are needed.",
+                    why=f"{1e3 * max(cover, 0.0):.2g} mm of tissue cover it, and {1e3 * LEAST_COVER:g} mm are needed.",
                     fix="Put it deeper, or make vary.high smaller.",
                 )
             body_with_lumps(self._surrogate(name), body, [lump]).save(file)

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
 import palpate as pp
 from benchmarks.records import Record, renew
@@ -53,7 +54,7 @@ class Case:
 
     words: str
     body: Callable[[], pp.Body]
-    shape: pp.tools.Tool
+    shape: Callable[[], pp.tools.Tool]
     options: tuple[tuple[str, Any], ...] = ()
     solves: tuple[int, int] = (40, 20)  # to learn from, and to judge by
     depths: int = 4  # in a series to learn from
@@ -61,23 +62,59 @@ class Case:
 
     def problem(self) -> Any:
         """Return the problem."""
-        tool = pp.SurfaceTool(self.shape, depth=DEPTHS, pad=6e6, element=0.004, **dict(self.options))
+        tool = pp.SurfaceTool(self.shape(), depth=DEPTHS, pad=6e6, element=0.004, **dict(self.options))
         return self.body().problem(tool)
 
 
 OVER = (("over", ((0.018, 0.016), (0.026, 0.024))),)
-CAPSULE, PUNCH = pp.tools.Capsule(RADIUS, 0.020), pp.tools.Punch(RADIUS, 0.002)
+
+
+def _sphere() -> pp.tools.Tool:
+    return pp.tools.Sphere(RADIUS)
+
+
+def _capsule() -> pp.tools.Tool:
+    return pp.tools.Capsule(RADIUS, 0.020)
+
+
+def _punch() -> pp.tools.Tool:
+    return pp.tools.Punch(RADIUS, 0.002)
+
+
+def _file_sphere() -> pp.tools.Tool:
+    """Return the sphere as a file of its triangles has it."""
+    return _read(trimesh.creation.icosphere(subdivisions=3, radius=1e3 * RADIUS), "ball")
+
+
+def _file_fingertip() -> pp.tools.Tool:
+    """Return a finger of 16 × 14 × 24 mm that points down: flatter at the nail, a little lumpy."""
+    finger = trimesh.creation.icosphere(subdivisions=4)
+    x, y, z = finger.vertices.T
+    wide = 7 * y * np.where(y > 0, 0.8, 1.0) + 0.15 * np.sin(3 * x)
+    finger.vertices = np.stack([8 * x * (1 - 0.06 * z), wide, 12 * z], axis=1)
+    return _read(finger, "finger")
+
+
+def _read(surface: trimesh.Trimesh, name: str) -> pp.tools.Tool:
+    """Return the tool of a surface in mm, by way of its STL."""
+    with tempfile.TemporaryDirectory() as folder:
+        surface.export(path := Path(folder) / f"{name}.stl")
+        return pp.read_tool(path, unit="mm")
+
+
 CASES = {
-    "block-sphere": Case("sphere on a block", _block, pp.tools.Sphere(RADIUS), OVER),
-    "block-capsule": Case("capsule on a block", _block, CAPSULE, OVER),
-    "block-punch": Case("punch on a block", _block, PUNCH, OVER),
-    "dome-sphere": Case("sphere on a dome", _dome, pp.tools.Sphere(RADIUS)),
-    "dome-capsule": Case("capsule on a dome", _dome, CAPSULE),
-    "dome-punch": Case("punch on a dome", _dome, PUNCH),
+    "block-sphere": Case("sphere on a block", _block, _sphere, OVER),
+    "block-capsule": Case("capsule on a block", _block, _capsule, OVER),
+    "block-punch": Case("punch on a block", _block, _punch, OVER),
+    "block-file-sphere": Case("sphere of an STL on a block", _block, _file_sphere, OVER),
+    "block-file-fingertip": Case("fingertip of a scan on a block", _block, _file_fingertip, OVER),
+    "dome-sphere": Case("sphere on a dome", _dome, _sphere),
+    "dome-capsule": Case("capsule on a dome", _dome, _capsule),
+    "dome-punch": Case("punch on a dome", _dome, _punch),
     "block-capsule-axis": Case(
         "capsule on a block, its axis an input, to 20°",
         _block,
-        CAPSULE,
+        _capsule,
         (*OVER, ("turns", "axis"), ("tilt", math.radians(20))),
         solves=(120, 40),
         depths=3,

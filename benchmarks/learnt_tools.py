@@ -4,6 +4,7 @@
     python -m benchmarks.learnt_tools --case dome-punch   one of them, some minutes
     python -m benchmarks.learnt_tools --folder solves     solves are kept in a folder, and taken from there
     python -m benchmarks.learnt_tools --record            the table of record and the documentation's block, too
+    python -m benchmarks.learnt_tools --case dome-punch --record   the same, other cases as recorded before
 
 Bodies are neo-Hookean, 9 kPa, ν 0.45: a block of 44 × 40 × 20 mm and a dome of radius 30 mm, 18 mm high. Pads have 6e6
 N/m³, elements under a tool are 4 mm long, presses 0.5 to 4 mm deep. Solves to judge by are at places, depths and angles
@@ -18,7 +19,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -208,6 +209,16 @@ def table(rows: dict[str, dict[str, Any]]) -> Table:
     )
 
 
+def _with_others(measured: Record) -> Record:
+    """Return a record with the rows and claims that the one on disk has of cases not measured now."""
+    old, words = Record.read("learnt_tools"), [case.words for case in CASES.values()]
+    fresh = {row[0] for row in measured.rows}
+    rows = [*measured.rows, *(row for row in old.rows if row[0] not in fresh)]
+    kept = [claim for claim in old.claims if not any(f": {name}: " in claim for name in fresh)]
+    rows.sort(key=lambda row: words.index(row[0]))
+    return replace(measured, rows=tuple(rows), claims=(*measured.claims, *kept))
+
+
 def main(arguments: list[str]) -> int:
     """Measure the cases that are asked for, and print their table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -225,7 +236,7 @@ def main(arguments: list[str]) -> int:
     found = Record.of(table(rows))
     print(found.markdown())
     if options.record:
-        found.write("learnt_tools")
+        _with_others(found).write("learnt_tools")
         renew()
     return 0
 

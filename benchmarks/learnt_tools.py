@@ -4,6 +4,7 @@
     python -m benchmarks.learnt_tools --case dome-punch   one of them, some minutes
     python -m benchmarks.learnt_tools --folder solves     solves are kept in a folder, and taken from there
     python -m benchmarks.learnt_tools --record            the table of record and the documentation's block, too
+    python -m benchmarks.learnt_tools --case dome-punch --record   the same, other cases as recorded before
 
 Bodies are neo-Hookean, 9 kPa, ν 0.45: a block of 44 × 40 × 20 mm and a dome of radius 30 mm, 18 mm high. Pads have 6e6
 N/m³, elements under a tool are 4 mm long, presses 0.5 to 4 mm deep. Solves to judge by are at places, depths and angles
@@ -18,11 +19,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
 import palpate as pp
 from benchmarks.records import Record, renew
@@ -58,7 +60,7 @@ class Case:
 
     words: str
     body: Callable[[], pp.Body]
-    shape: pp.tools.Tool | pp.Pinch
+    shape: Callable[[], pp.tools.Tool | pp.Pinch]
     options: tuple[tuple[str, Any], ...] = ()
     solves: tuple[int, int] = (40, 20)  # to learn from, and to judge by
     depths: int = 4  # in a series to learn from
@@ -66,25 +68,73 @@ class Case:
 
     def problem(self) -> Any:
         """Return the problem."""
-        if isinstance(self.shape, pp.Pinch):
-            return self.body().problem(self.shape)
-        tool = pp.SurfaceTool(self.shape, depth=DEPTHS, pad=6e6, element=0.004, **dict(self.options))
+        shape = self.shape()
+        if isinstance(shape, pp.Pinch):
+            return self.body().problem(shape)
+        tool = pp.SurfaceTool(shape, depth=DEPTHS, pad=6e6, element=0.004, **dict(self.options))
         return self.body().problem(tool)
 
 
 OVER = (("over", ((0.018, 0.016), (0.026, 0.024))),)
-CAPSULE, PUNCH = pp.tools.Capsule(RADIUS, 0.020), pp.tools.Punch(RADIUS, 0.002)
+
+
+def _sphere() -> pp.tools.Tool:
+    return pp.tools.Sphere(RADIUS)
+
+
+def _capsule() -> pp.tools.Tool:
+    return pp.tools.Capsule(RADIUS, 0.020)
+
+
+def _punch() -> pp.tools.Tool:
+    return pp.tools.Punch(RADIUS, 0.002)
+
+
+def _two_capsules() -> pp.Pinch:
+    return pp.Pinch(
+        pp.tools.Capsule(RADIUS, 0.018),
+        touches="x_min + x_max",
+        depth=DEPTHS,
+        pad=6e6,
+        element=0.004,
+        over=((0.015, 0.012), (0.025, 0.020)),
+    )
+
+
+def _file_sphere() -> pp.tools.Tool:
+    """Return the sphere as a file of its triangles has it."""
+    return _read(trimesh.creation.icosphere(subdivisions=3, radius=1e3 * RADIUS), "ball")
+
+
+def _file_fingertip() -> pp.tools.Tool:
+    """Return a finger of 16 × 14 × 24 mm that points down: flatter at the nail, a little lumpy."""
+    finger = trimesh.creation.icosphere(subdivisions=4)
+    x, y, z = finger.vertices.T
+    wide = 7 * y * np.where(y > 0, 0.8, 1.0) + 0.15 * np.sin(3 * x)
+    finger.vertices = np.stack([8 * x * (1 - 0.06 * z), wide, 12 * z], axis=1)
+    return _read(finger, "finger")
+
+
+def _read(surface: trimesh.Trimesh, name: str) -> pp.tools.Tool:
+    """Return the tool of a surface in mm, by way of its STL."""
+    with tempfile.TemporaryDirectory() as folder:
+        surface.export(path := Path(folder) / f"{name}.stl")
+        return pp.read_tool(path, unit="mm")
+
+
 CASES = {
-    "block-sphere": Case("sphere on a block", _block, pp.tools.Sphere(RADIUS), OVER),
-    "block-capsule": Case("capsule on a block", _block, CAPSULE, OVER),
-    "block-punch": Case("punch on a block", _block, PUNCH, OVER),
-    "dome-sphere": Case("sphere on a dome", _dome, pp.tools.Sphere(RADIUS)),
-    "dome-capsule": Case("capsule on a dome", _dome, CAPSULE),
-    "dome-punch": Case("punch on a dome", _dome, PUNCH),
+    "block-sphere": Case("sphere on a block", _block, _sphere, OVER),
+    "block-capsule": Case("capsule on a block", _block, _capsule, OVER),
+    "block-punch": Case("punch on a block", _block, _punch, OVER),
+    "block-file-sphere": Case("sphere of an STL on a block", _block, _file_sphere, OVER),
+    "block-file-fingertip": Case("fingertip of a scan on a block", _block, _file_fingertip, OVER),
+    "dome-sphere": Case("sphere on a dome", _dome, _sphere),
+    "dome-capsule": Case("capsule on a dome", _dome, _capsule),
+    "dome-punch": Case("punch on a dome", _dome, _punch),
     "block-capsule-axis": Case(
         "capsule on a block, its axis an input, to 20°",
         _block,
-        CAPSULE,
+        _capsule,
         (*OVER, ("turns", "axis"), ("tilt", math.radians(20))),
         solves=(120, 40),
         depths=3,
@@ -93,14 +143,7 @@ CASES = {
     "block-pinch": Case(
         "two capsules pinch a block of 30 × 40 × 30 mm",
         _upright_block,
-        pp.Pinch(
-            pp.tools.Capsule(RADIUS, 0.018),
-            touches="x_min + x_max",
-            depth=DEPTHS,
-            pad=6e6,
-            element=0.004,
-            over=((0.015, 0.012), (0.025, 0.020)),
-        ),
+        _two_capsules,
         solves=(60, 20),
         bounds=(0.01, 0.035),
     ),
@@ -126,7 +169,7 @@ def judge(name: str, train: Dataset, test: Dataset, effort: float) -> dict[str, 
     """Return a row of the table: what a body learnt from some solves misses of others."""
     test = test.ok
     body = pp.learn(train, effort=effort, shape=False, workers=1)[0]
-    energy, force, pinched = body.hand_energy, test.response[:, :3], isinstance(CASES[name].shape, pp.Pinch)
+    energy, force, pinched = body.hand_energy, test.response[:, :3], isinstance(CASES[name].shape(), pp.Pinch)
     felt = energy.force(test.X)
     if pinched:  # of balanced jaws the force on both is nothing: the effort counts beside it
         force, felt = test.response, np.column_stack([felt, body.effort(test.X)])
@@ -195,6 +238,16 @@ def table(rows: dict[str, dict[str, Any]]) -> Table:
     )
 
 
+def _with_others(measured: Record) -> Record:
+    """Return a record with the rows and claims that the one on disk has of cases not measured now."""
+    old, words = Record.read("learnt_tools"), [case.words for case in CASES.values()]
+    fresh = {row[0] for row in measured.rows}
+    rows = [*measured.rows, *(row for row in old.rows if row[0] not in fresh)]
+    kept = [claim for claim in old.claims if not any(f": {name}: " in claim for name in fresh)]
+    rows.sort(key=lambda row: words.index(row[0]))
+    return replace(measured, rows=tuple(rows), claims=(*measured.claims, *kept))
+
+
 def main(arguments: list[str]) -> int:
     """Measure the cases that are asked for, and print their table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -212,7 +265,7 @@ def main(arguments: list[str]) -> int:
     found = Record.of(table(rows))
     print(found.markdown())
     if options.record:
-        found.write("learnt_tools")
+        _with_others(found).write("learnt_tools")
         renew()
     return 0
 

@@ -23,10 +23,11 @@ from palpate.export.check_points import compare_body
 from palpate.export.fmu_binaries import built_binaries, fmu_source
 from palpate.export.fmu_export import VERSIONS
 from palpate.export.weights_block import WeightsBlock, fnv
+from palpate.runtime.touchable import touchable
 from palpate.surrogates import LearntEnergy, Surrogate
 from system_programs import require_program
 
-NAMES = ["contact", "relaxation", "indentation", "pad", "constant", "iwan"]
+NAMES = ["contact", "relaxation", "indentation", "pad", "constant", "iwan", "friction"]
 HERE = Path(__file__).parent
 FMPY = Path(fmpy.__file__).parent
 
@@ -84,6 +85,31 @@ def test_fmpy_simulates_it(name, kind, version, files):
 
 
 @pytest.mark.parametrize("version", VERSIONS)
+def test_a_slide_with_friction_in_co_simulation_is_that_of_python(version, files):
+    """Pressed, dragged until it slips, and turned back: each force to the digits of the two languages' arithmetic."""
+    thing = body("friction")
+    t = np.linspace(0.0, 0.4, 401)
+    path = np.stack([0.01 * np.sin(4 * np.pi * t), 0.002 * t, 0.01 - 0.02 * np.minimum(t, 0.15)], axis=-1)
+    signals = np.array([(s, *row) for s, row in zip(t, path, strict=True)], [(k, float) for k in "txyz"])
+    signals.dtype.names = ("time", "x", "y", "z")
+    result = fmpy.simulate_fmu(
+        str(files / f"friction-{version}.fmu"), fmi_type="CoSimulation", input=signals,
+        output=["x", "y", "z", "fx", "fy", "fz"], stop_time=0.4, step_size=1e-3, output_interval=1e-3,
+    )  # fmt: skip
+    places, forces = (
+        np.column_stack([result[k] for k in names]) for names in (["x", "y", "z"], ["fx", "fy", "fz"])
+    )
+    hand = touchable(thing).evaluator()
+    hand.elapsed, further = 1e-3, np.array([(r.low + r.high) / 2 for r in touchable(thing).parameters])
+    wanted = []
+    for place in places[1:]:
+        hand(place, further)
+        wanted.append(hand.force.copy())
+    np.testing.assert_allclose(forces[1:], wanted, rtol=1e-9, atol=1e-12)
+    assert np.abs(forces[:, 0]).max() > 0.2 * forces[:, 2].max()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", NAMES)
 def test_its_descriptions_are_valid(name, version, files):
     file = files / f"{name}-{version}.fmu"
@@ -91,7 +117,7 @@ def test_its_descriptions_are_valid(name, version, files):
     description = fmpy.read_model_description(str(file))
     assert description.coSimulation is not None
     # what indentations and sliders remember follows no differential equation
-    assert (description.modelExchange is None) == (name in ("indentation", "iwan"))
+    assert (description.modelExchange is None) == (name in ("indentation", "iwan", "friction"))
     if version == "3.0":
         schema = etree.XMLSchema(etree.parse(FMPY / "schema" / "fmi3" / "fmi3BuildDescription.xsd"))
         with zipfile.ZipFile(file) as packed:

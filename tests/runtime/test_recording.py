@@ -69,6 +69,9 @@ BODIES = {
     "stiff block": lambda: pressed.surrogate(factor=50.0),
     "relaxing block": lambda: pressed.surrogate(factor=50.0, memory=Relaxation(((0.4, 0.1),))),
     "yielding rod": held.yielding_rod,
+    "rubbed block": lambda: pressed.surrogate(factor=50.0, memory=Relaxation(((0.4, 0.1),))).with_friction(
+        0.3, 0.4
+    ),
 }
 
 
@@ -97,6 +100,27 @@ def test_a_simulated_hand_is_replayed_to_the_last_bit(name, before, tmp_path):
     assert_same(trace, body)
     if name == "stiff block":
         assert trace.ticks["ledger"][:, 2].max() > 0.0, "damping was added"
+
+
+def test_a_slide_whose_friction_a_slider_changes_is_replayed(tmp_path):
+    """A page that drags a tool over a block, while the coefficient goes from 0 to twice its value and back."""
+    block = pressed.surrogate(factor=50.0, memory=Relaxation(((0.4, 0.1),)))
+    body = touchable(block.with_friction(0.3, 0.4))
+    shared = Shared.private()
+    touch = Recorded(tmp_path / "a.trace", body, PageDevice(shared.command), shared)
+    for frame in range(40):
+        turn = 2 * np.pi * frame / 40
+        target = 0.01 * np.array([np.sin(turn), -1.0, np.cos(turn)])  # the hand's y points up
+        shared.write_command(
+            beat=5.0 + touch.k * touch.loop.period, period=0.02, grabbed=True, target=target,
+            parameters=[0.3 - 0.3 * np.cos(turn)],
+        )  # fmt: skip
+        touch.tick(15)
+    trace = touch.trace()
+    assert len(np.unique(trace.parameters[:, -1])) > 10
+    sideways = np.abs(trace.ticks["force"][:, [0, 2]]).max(axis=1)
+    assert sideways.max() > 0.1 * np.abs(trace.ticks["force"]).max()
+    assert_same(trace, body)
 
 
 def test_a_page_drive_with_pauses_and_moved_parameters_is_replayed(tmp_path):

@@ -158,6 +158,33 @@ def test_surfaces_that_bound_no_tool_are_refused(ball_file, tmp_path):
         pp.read_tool(ball_file, unit="mm", spacing=0.005)
 
 
+@pytest.mark.parametrize(
+    ("place", "radius", "words"),
+    [(30.0, RADIUS, "2 closed shells"), (0.8 * RADIUS, RADIUS, "2 closed shells"), (0.0, RADIUS / 2, "2 closed shells")],
+    ids=["apart", "overlapping", "cavity"],
+)
+def test_a_tool_of_two_shells_is_refused(ball_file, tmp_path, place, radius, words):
+    import trimesh
+
+    other = trimesh.creation.icosphere(subdivisions=3, radius=radius)
+    other.apply_translation([place, 0.0, 0.0])
+    if radius < RADIUS:
+        other.invert()
+    trimesh.util.concatenate([trimesh.load_mesh(ball_file), other]).export(tmp_path / "two.stl")
+    with pytest.raises(UsageError, match=words):
+        pp.read_tool(tmp_path / "two.stl", unit="mm")
+
+
+@pytest.mark.parametrize(("radius", "fix"), [(3.0, 'unit="mm"'), (0.00001, 'unit="m"')])
+def test_a_tool_in_a_mistaken_unit_is_refused(tmp_path, radius, fix):
+    """Millimetres taken as metres, also of a tool that is no longer than a body may be, and the other way round."""
+    import trimesh
+
+    trimesh.creation.icosphere(subdivisions=2, radius=radius).export(tmp_path / "ball.stl")
+    with pytest.raises(UsageError, match=fix):
+        pp.read_tool(tmp_path / "ball.stl", unit="m" if radius > 1 else "mm")
+
+
 def test_a_damaged_lattice_is_refused(ball):
     with pytest.raises(UsageError, match="is damaged"):
         replace(ball, ranks=(2, 2, 2))

@@ -71,18 +71,31 @@ def forces(text: str) -> np.ndarray:
     return -4 * MILLI * np.array([float(row.split()[-1]) for row in totals])
 
 
-def contact(law: str, stiff: float) -> list[str]:
-    """Materials of body and tool, and frictionless contact between them under a penalty in kPa/mm."""
+def contact(law: str, stiff: float, friction: tuple[float, float] | None = None) -> list[str]:
+    """Materials of body and tool, and contact between them under a penalty in kPa/mm.
+
+    `friction` has the coefficient and the stiffness of what sticks, in kPa/mm.
+    """
+    rubs = [] if friction is None else ["*FRICTION", ", ".join(map(repr, friction))]
     return [
         *("*MATERIAL, NAME=LAW", law, "*SOLID SECTION, ELSET=BODY, MATERIAL=LAW"),
         *("*MATERIAL, NAME=HARD", "*ELASTIC", "1e6, 0.3", "*SOLID SECTION, ELSET=TOOL, MATERIAL=HARD"),
-        *("*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{stiff!r}"),
+        *(
+            "*SURFACE INTERACTION, NAME=TOUCH",
+            "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
+            f"{stiff!r}",
+            *rubs,
+        ),
         *("*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE", "TOP, FRONT"),
     ]
 
 
-def block(across: np.ndarray, along: np.ndarray, down: np.ndarray) -> list[str]:
-    """Nodes, elements and sets from ends of elements along x, y and −z, from small to large; the top is z = 0."""
+def block(across: np.ndarray, along: np.ndarray, down: np.ndarray, *, linear: bool = False) -> list[str]:
+    """Nodes, elements and sets from ends of elements along x, y and −z, from small to large; the top is z = 0.
+
+    Elements are C3D20R, or C3D8 where they are linear.
+    """
+    places = CORNERS if linear else CORNERS + MIDDLES
     x, y, z = (
         np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2])).tolist() for ends in (across, along, down)
     )
@@ -91,13 +104,14 @@ def block(across: np.ndarray, along: np.ndarray, down: np.ndarray) -> list[str]:
     counts = (len(across) - 1, len(along) - 1, len(down) - 1)
     for i, j, k in np.ndindex(*counts):
         # k counts downwards, so an element's lower side comes first
-        own = [(2 * i + a, 2 * j + b, 2 * k + 2 - c) for a, b, c in CORNERS + MIDDLES]
+        own = [(2 * i + a, 2 * j + b, 2 * k + 2 - c) for a, b, c in places]
         elements.append([number.setdefault(node, len(number) + 1) for node in own])
     lines = ["*NODE, NSET=ALL"]
     lines += [f"{n}, {x[i]!r}, {y[j]!r}, {-z[k]!r}" for (i, j, k), n in number.items()]
-    lines += ["*ELEMENT, TYPE=C3D20R, ELSET=BODY"]
+    lines += [f"*ELEMENT, TYPE={'C3D8' if linear else 'C3D20R'}, ELSET=BODY"]
     for n, row in enumerate(elements, 1):
-        lines += [", ".join(map(str, [n, *row[:10]])) + ",", ", ".join(map(str, row[10:]))]
+        words = list(map(str, [n, *row]))
+        lines += [", ".join(words)] if linear else [", ".join(words[:11]) + ",", ", ".join(words[11:])]
     last = 2 * counts[2]
     for name, axis, value in (("BOTTOM", 2, last), ("XSIDE", 0, 0), ("YSIDE", 1, 0)):
         lines += [f"*NSET, NSET={name}", *(f"{n}," for node, n in number.items() if node[axis] == value)]
@@ -106,22 +120,24 @@ def block(across: np.ndarray, along: np.ndarray, down: np.ndarray) -> list[str]:
 
 
 def cap(ball: float, *, half: bool = False) -> list[str]:
-    """A quarter or half of the ball's lower cap as a layer of hexahedra (C3D8), its tip at x = y = z = 0."""
+    """The ball's lower cap as a layer of hexahedra (C3D8), its tip at z = 0: a quarter, x, y ≥ 0, or a half, y ≥ 0."""
     count = math.ceil(REACH / FACET)
-    slopes = np.tan(np.arange(-1, count + 1) * REACH / count)  # of lines through the centre, in two planes
-    across = np.concatenate([-slopes[:1:-1], slopes[1:]]) if half else slopes
-    # numbers that the block's nodes and elements do not have
-    first, width, size = 1_000_000, len(slopes), len(across) * len(slopes)
+    # of lines through the centre, in two planes
+    across, slopes = (
+        np.tan(np.arange(low, count + 1) * REACH / count) for low in (-count if half else -1, -1)
+    )
+    first, width = 1_000_000, len(slopes)  # numbers that the block's nodes and elements do not have
+    layers = len(across) * width
     lines, faces = ["*NODE, NSET=TOOLNODES"], []
     for layer, (i, j) in itertools.product((0, 1), np.ndindex(len(across), width)):
         ray = np.array([across[i], slopes[j], -1.0])
         place = (1 - THICK * layer) * ball * ray / np.linalg.norm(ray) + [0.0, 0.0, ball]
-        number = first + layer * size + i * width + j
+        number = first + layer * layers + i * width + j
         lines.append(", ".join(map(repr, [number, *place.tolist()])))
     lines.append("*ELEMENT, TYPE=C3D8, ELSET=TOOL")
     for i, j in np.ndindex(len(across) - 1, width - 1):
         n = first + i * width + j
         square = [n, n + width, n + width + 1, n + 1]
-        lines.append(", ".join(map(str, [n, *square, *(m + size for m in square)])))
+        lines.append(", ".join(map(str, [n, *square, *(m + layers for m in square)])))
         faces.append(f"{n}, S1")
     return [*lines, "*SURFACE, NAME=FRONT", *faces]

@@ -78,20 +78,22 @@ class Geometry(Protocol):
         """Everything that decides the mesh, as plain data for a JSON file."""
 
 
-def require_size(what: str, longest: float, unit: str = "") -> None:
-    """Refuse a body whose longest side tells of mistaken units.
+def require_size(
+    what: str, longest: float, unit: str = "", kind: str = "body to be touched", most: float = LARGEST
+) -> None:
+    """Refuse a body or another `kind` of thing whose longest side tells of mistaken units.
 
-    The side must be 1 mm to 10 m, given in m; `what` is the body as the message begins, `unit` that of the file it
+    The side must be 1 mm to `most`, given in m; `what` is the body as the message begins, `unit` that of the file it
     was read from, empty where the user gives lengths in m.
     """
-    if SMALLEST <= longest <= LARGEST:
+    if SMALLEST <= longest <= most:
         return
     taken = f"Its lengths were taken as {unit}" if unit else "Lengths are in m"
-    guess = "mm" if longest > LARGEST else "m"
+    guess = "mm" if longest > most else "m"
     advice = f'Pass unit="{guess}" if the file is in {guess}' if unit else "Pass 0.1 for 100 mm"
     raise UsageError(
         f"{what} would be {longest:.4g} m long.",
-        why=f"{taken}, and a body to be touched measures between {SMALLEST:g} and {LARGEST:g} m.",
+        why=f"{taken}, and a {kind} measures between {SMALLEST:g} and {most:g} m.",
         fix=f"{advice}.",
     )
 

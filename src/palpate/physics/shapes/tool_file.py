@@ -36,6 +36,7 @@ SIDE = (
 MARGIN = 3  # nodes of the lattice outside the tool on each side
 MOST = 120  # nodes along an axis
 MOST_TRIANGLES = 100_000
+LONGEST = 1.0  # m: a tool that a hand leads is shorter, so a longer one's unit is mistaken
 LEVEL = 0.995  # of the largest inscribed radius on the tool's axis, at which its centre is
 AXES = {"+x": (0, 1), "-x": (0, -1), "+y": (1, 1), "-y": (1, -1), "+z": (2, 1), "-z": (2, -1)}
 
@@ -74,8 +75,8 @@ def read_tool(
     Raises
     ------
     UsageError
-        If the surface is open, inside out, cuts itself or is no manifold, its size tells of a mistaken unit, or the
-        spacing is too fine or too coarse for it.
+        If the surface is open, inside out, of several shells, cuts itself or is no manifold, its size tells of a
+        mistaken unit, or the spacing is too fine or too coarse for it.
     FileFormatError
         If the file is damaged or of another format.
     """
@@ -110,7 +111,7 @@ def _closed_surface(path: str, unit: str) -> tuple[np.ndarray, np.ndarray]:
 
     surface = repair_surface(parse_surface(path))
     points = surface.points * UNITS[unit]
-    require_size(path, float(np.ptp(points, axis=0).max()), unit)
+    require_size(path, float(np.ptp(points, axis=0).max()), unit, "tool", LONGEST)
     solid = Trimesh(points, surface.triangles, process=False)
     if solid.is_watertight and solid.volume < 0:
         raise UsageError(
@@ -119,6 +120,12 @@ def _closed_surface(path: str, unit: str) -> tuple[np.ndarray, np.ndarray]:
             fix="Turn its normals in the program that made the file, and export it again.",
         )
     require_closed(solid, path)
+    if solid.body_count > 1:
+        raise UsageError(
+            f"The surface of the tool {path} consists of {solid.body_count} closed shells.",
+            why="A tool is one rigid solid, whose distance is measured from one surface.",
+            fix="Unite the parts that touch (Boolean union), or export only the outer shell of the part that presses.",
+        )
     return points, np.asarray(surface.triangles)
 
 

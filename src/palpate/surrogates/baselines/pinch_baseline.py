@@ -174,7 +174,20 @@ class PinchBaseline(PosedBaseline):
 
 
 def require_one_tool(baseline: Baseline, what: str) -> None:
-    """Refuse a body under two jaws; `what` it can't do, in words."""
+    """Refuse a body under two jaws.
+
+    Parameters
+    ----------
+    baseline : Baseline
+        Of the body.
+    what : str
+        Verb and object of what it can't do, in words, such as "have friction".
+
+    Raises
+    ------
+    UsageError
+        For two jaws.
+    """
     if not isinstance(baseline, PinchBaseline):
         return
     raise UsageError(

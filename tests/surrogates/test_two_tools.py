@@ -14,9 +14,9 @@ DEEP = np.array([[0.0, 0.0, 0.009]])  # m: a ball of 10 mm, 1 mm deep
 
 def test_two_tools_far_apart_feel_their_own_forces():
     energy, radius = touch_energy(), np.sqrt(2 * 0.010 * 0.001)
-    far = DEEP + [1.01 * APART * radius, 0.0, 0.0]
+    far = DEEP + np.array([1.01 * APART * radius, 0.0, 0.0])
     first, second = two_tool_forces(energy, DEEP, far)
     np.testing.assert_array_equal(first, energy.force(DEEP))
     np.testing.assert_array_equal(second, energy.force(far))
     with pytest.raises(UsageError, match="learn both tools together"):
-        two_tool_forces(energy, DEEP, DEEP + [0.99 * APART * radius, 0.0, 0.0])
+        two_tool_forces(energy, DEEP, DEEP + np.array([0.99 * APART * radius, 0.0, 0.0]))

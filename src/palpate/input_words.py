@@ -12,6 +12,8 @@ _WORDS = (
     (r"p_([xyz])(_\d+)?", r"pad's place along \1"),
     (r"tip_([xyz])(_\d+)?", r"tool's foremost point along \1"),
     (r"tip_r([xyz])(_\d+)?", r"tool's turn about \1"),
+    (r"grip_([xyz])(_\d+)?", r"middle between the jaws along \1"),
+    (r"grip_opening(_\d+)?", "opening of the jaws"),
     (r"P", "force"),
     (r"P_([xyz])", r"force along \1"),
     (r"P_([\d.]+)m", "force at \\1\N{NO-BREAK SPACE}m"),

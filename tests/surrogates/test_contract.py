@@ -10,7 +10,17 @@ import numpy as np
 import pytest
 from surrogate_checks import CHECKS, MEMORY_CHECKS, Example
 from test_pad_energy import made as pad_energy
-from touch_made import BOX, DEEPEST, RADIUS, around_points, overlap_baseline, plane, touch_energy, undisturbed
+from touch_made import (
+    BOX,
+    DEEPEST,
+    RADIUS,
+    around_points,
+    overlap_baseline,
+    plane,
+    slab,
+    touch_energy,
+    undisturbed,
+)
 
 import palpate as pp
 from models import linear_network
@@ -27,10 +37,16 @@ from palpate.surrogates import (
     RestStiffness,
     Stiffening,
 )
-from palpate.surrogates.baselines import PosedBaseline, ToolBaseline, deepest_ball, registered_baselines
+from palpate.surrogates.baselines import (
+    PinchBaseline,
+    PosedBaseline,
+    ToolBaseline,
+    deepest_ball,
+    registered_baselines,
+)
 from palpate.surrogates.energy_kernels import entry_of
 from palpate.surrogates.memories import Friction, Indentation, IwanElements, Memory, Patches, Relaxation
-from palpate.tools import Capsule, PosedTool
+from palpate.tools import Capsule, Gripper, PosedTool, Sphere
 
 INF = np.inf
 
@@ -94,6 +110,27 @@ def posed() -> Example:
 
 
 @functools.cache
+def pinch() -> Example:
+    """Two balls that pinch a slab."""
+    gripper = Gripper(Sphere(0.005))
+    baseline = PinchBaseline(ContactLaw("series", 1e-3), slab(), 0.005, tool=json.dumps(gripper.describe()))
+    box = [pp.Range(f"grip_{axis}", -r, r, "m") for axis, r in zip("xyz", (0.002, 0.01, 0.01), strict=True)]
+    opening = pp.Range("grip_opening", 0.014, 0.020, "m")
+    energy = touch_energy(
+        box=box,
+        extra=(opening,),
+        baseline=baseline,
+        continuation=Continuation.of([*box, opening], deepest=0.006),
+    )
+    X = np.random.default_rng(5).uniform([-0.002, -0.01, -0.01, 0.014], [0.002, 0.01, 0.01, 0.019], (1500, 4))
+    ends = np.array([[r.low, r.high] for r in box])
+    clear = (np.abs(X[:, :3, None] - ends) > 1e-4).all(axis=(1, 2))
+    clear &= (np.abs([s for s, _, _ in baseline.jaw_depths(X)]) > 4e-4).all(axis=0)
+    rest = X[:100] + np.array([0.0, 0.0, 0.0, 0.02])
+    return Example(pp.Surrogate(energy), rest, X[clear & (baseline.coordinate(X) > 1e-3)])
+
+
+@functools.cache
 def pad() -> Example:
     """A glued pad on a face, displaced in all directions."""
     rest = np.zeros((20, 5))
@@ -133,7 +170,7 @@ def _region(n: int) -> TrainedRegion:
     return TrainedRegion.of(np.random.default_rng(1).uniform(-1.0, 1.0, (200, n)))
 
 
-BODIES = (contact, overlap, tool, posed, pad, node, constant)
+BODIES = (contact, overlap, tool, posed, pinch, pad, node, constant)
 
 
 def relaxation(q: float) -> Memory:

@@ -68,6 +68,16 @@ def ball() -> TouchedSurface:
     return TouchedSurface.of(points, np.array(triangles), radius=0.006, reach=0.013, spacing=0.002)
 
 
+@functools.cache
+def slab() -> TouchedSurface:
+    """Two faces x = ±10 mm of a slab, 60 mm wide."""
+    y, z = np.meshgrid([-0.03, 0.03], [-0.03, 0.03])
+    face = np.stack([np.full(4, 0.01), y.ravel(), z.ravel()], axis=1)
+    points = np.vstack([face, face * [-1.0, 1.0, 1.0]])
+    front = np.array([[0, 1, 3], [0, 3, 2]])
+    return TouchedSurface.of(points, np.vstack([front, front[:, ::-1] + 4]), radius=0.005, spacing=0.0015)
+
+
 def ridges() -> tuple[np.ndarray, np.ndarray]:
     """Points (P, 3) and triangles of a face of 80 mm with a groove along y, 4 mm wide and 1.5 mm deep."""
     x, y = np.arange(-40.0, 41.0), np.linspace(-40.0, 40.0, 9)

@@ -1,8 +1,7 @@
-"""A pinch beside two separate tools, beside differences of its energy, and its contact law's derivatives."""
+"""A pinch beside two separate tools, and beside differences of its energy."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +10,7 @@ import pytest
 from palpate.physics import Body, Pinch
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block
-from palpate.surrogates import ContactLaw, TouchedSurface
-from palpate.surrogates.baselines import PinchBaseline
-from palpate.tools import Capsule, Gripper, Sphere
-from palpate.units import Range
+from palpate.tools import Sphere
 
 BODY = Body(Block((0.02, 0.02, 0.02), element=0.01), NeoHookean(9e3, 0.45))
 PINCH = Pinch(
@@ -75,34 +71,3 @@ def test_a_design_closes_the_jaws_series_by_series():
     assert all((np.diff(X[chain, 3]) < 0).all() for chain in chains)
     np.testing.assert_array_equal(problem.symmetry["about"], [0.01, 0.01, 0.01])
     assert len(problem.symmetry["isometries"]) == 4
-
-
-def slab():
-    """Two faces x = ±10 mm of a slab, as triangles."""
-    y, z = np.meshgrid([-0.03, 0.03], [-0.03, 0.03])
-    face = np.stack([np.full(4, 0.01), y.ravel(), z.ravel()], axis=1)
-    points = np.vstack([face, face * [-1.0, 1.0, 1.0]])
-    front = np.array([[0, 1, 3], [0, 3, 2]])
-    return TouchedSurface.of(points, np.vstack([front, front[:, ::-1] + 4]), radius=0.005, spacing=0.0015)
-
-
-def test_learning_sees_the_derivatives_by_centre_and_opening():
-    """ln U₀ by central differences, where both jaws touch and where one does."""
-    gripper = Gripper(Capsule(0.005, 0.016))
-    baseline = PinchBaseline(ContactLaw("series", 1e-3), slab(), 0.005, tool=json.dumps(gripper.describe()))
-    inputs = tuple(Range(name, -1.0, 1.0, "m") for name in "abcd")
-    rng = np.random.default_rng(0)
-    X = rng.uniform([-0.003, -0.01, -0.01, 0.014], [0.003, 0.01, 0.01, 0.018], (30, 4))
-    X = X[baseline.coordinate(X) > 2e-4]
-    depths = np.array([s for s, _, _ in baseline.jaw_depths(X)])
-    assert (depths.min(axis=0) > 0).any()
-    assert (depths.min(axis=0) < 0).any()
-    value, slope, bend = baseline.logarithm(X, inputs)
-    for i, way in enumerate(1e-7 * np.eye(4)):
-        ends = [baseline.logarithm(X + sign * way, inputs) for sign in (1, -1)]
-        np.testing.assert_allclose(
-            slope[:, i], (ends[0][0] - ends[1][0]) / 2e-7, atol=1e-5 * np.abs(slope).max()
-        )
-        curved = (ends[0][1] - ends[1][1]) / 2e-7
-        np.testing.assert_allclose(bend[:, i], curved, atol=1e-4 * np.abs(bend).max())
-    assert np.isfinite(value).all()

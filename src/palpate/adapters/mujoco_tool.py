@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.surrogates import Surrogate
+from palpate.surrogates.baselines import require_one_tool
 from palpate.surrogates.learnt_torque import TURNS
 from palpate.tools.rotations import rotation_vector, swing_vector
 
@@ -47,6 +48,7 @@ class SceneTool:
 
 def tool_of(mujoco: Any, model: Any, body: Surrogate, geom: str | None, site: str | None) -> SceneTool:
     """Return the tool by the name of its geom or of its site; one that doesn't fit what was learnt is refused."""
+    require_one_tool(body.hand_energy.baseline, "act in a MuJoCo scene")
     posed = getattr(body.hand_energy.baseline, "posed_tool", None)
     named = geom if posed is None else site
     if named is None or (geom is not None and site is not None):

@@ -6,6 +6,7 @@ import numpy as np
 
 from palpate.errors import UsageError
 from palpate.surrogates import FieldSurrogate, Surrogate
+from palpate.surrogates.baselines import require_one_tool
 
 __all__ = ["press_ends", "probe_radius", "require_touch", "shown_mesh", "tool_words"]
 
@@ -39,6 +40,7 @@ def probe_radius(surrogate: Surrogate) -> float:
 
 def tool_words(surrogate: Surrogate) -> str:
     """Return a sentence that says what the tool is."""
+    require_one_tool(surrogate.hand_energy.baseline, "act in a game engine")
     radius = probe_radius(surrogate)
     if surrogate.hand_energy.baseline.holds:
         return "The body is held where the tool starts."

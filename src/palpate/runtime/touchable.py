@@ -31,7 +31,7 @@ from palpate.surrogates.memories import Friction, Memory
 from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.tool_friction import with_friction
 from palpate.surrogates.training_record import correction_count, correction_warning
-from palpate.tools import PosedTool
+from palpate.tools import Gripper, PosedTool
 from palpate.units import Range, bounds
 
 __all__ = ["FRICTION", "Touchable", "aim_device", "load_touchable", "touchable"]
@@ -97,6 +97,12 @@ class Touchable:
         """The rigid tool that presses, in the orientation in which its further inputs find it; None of a ball."""
         tool = getattr(self.energy.baseline, "posed_tool", None)
         return tool if isinstance(tool, PosedTool) else None
+
+    @property
+    def gripper(self) -> Gripper | None:
+        """The two jaws that pinch, whose opening is a further input; None of any other tool."""
+        tool = getattr(self.energy.baseline, "posed_tool", None)
+        return tool if isinstance(tool, Gripper) else None
 
     @cached_property
     def shift(self) -> np.ndarray:
@@ -210,6 +216,8 @@ class Touchable:
             return np.zeros(3), np.array([0.0, 0.0, 1.0])
         # the middle of the ranges where that is a press; on a curved body it may lie too deep
         x = self._nearest_press()
+        if self.gripper is not None:  # its centre lies in the body, and leaves it upwards, between the jaws
+            return x[:3], np.eye(3)[0 if self.gripper.axis == "z" else 2]
         if self.surface is None:  # a probe that is felt without a surface: it comes against its force
             force = self.energy.force(x[None])[0]
             normal = force / np.linalg.norm(force)
@@ -248,7 +256,13 @@ class Touchable:
 
     @property
     def away(self) -> np.ndarray:
-        """Where a probe (3,) is that nobody holds, m: a radius above `home`, in the air. What is held is at rest."""
+        """Where a probe (3,) is that nobody holds, m: a radius above `home`, in the air. What is held is at rest.
+
+        Two jaws are beside the body, whatever their opening.
+        """
+        if self.gripper is not None:
+            low, high = self.energy.baseline.surfaces[0].box
+            return self.home + float(np.linalg.norm(high - low)) * self.normal
         return self.home if self.holds else self.home + self.radius * self.normal
 
     def held_place(self, parameters: np.ndarray) -> np.ndarray:

@@ -45,6 +45,7 @@ from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.surrogates.moving_rest import Followed, follow
 from palpate.surrogates.tool_friction import with_friction
 from palpate.surrogates.training_record import training_in_words
+from palpate.surrogates.two_tools import two_tool_forces
 from palpate.units import Quantity, Range
 
 __all__ = ["KIND", "Surrogate"]
@@ -227,6 +228,16 @@ class Surrogate:
             For a body that was not learnt from pinches.
         """
         return efforts(self.hand_energy, X)
+
+    def two_tool_forces(self, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the forces (N, 3) in N on two separate tools at inputs (N, n) each.
+
+        Raises
+        ------
+        UsageError
+            For two that are nearer than 3.5 contact radii: each would feel what the other does to the body.
+        """
+        return two_tool_forces(self.hand_energy, first, second)
 
     @property
     def _remembers(self) -> str:

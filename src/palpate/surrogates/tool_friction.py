@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.errors import UsageError
+from palpate.surrogates.baselines import require_one_tool
 from palpate.surrogates.memories import Friction, Memory
 from palpate.surrogates.memories.friction import MINDLIN, require_coefficients
 
@@ -49,6 +50,7 @@ def with_friction(
             why="The hand holds a place of it, and no tool slides on its surface.",
             fix="Learn the body under a ball or another tool that presses it.",
         )
+    require_one_tool(energy.baseline, "have friction")
     exponent, depth = _press(energy)
     return Friction.over(depth, kinetic, static, exponent=exponent, ratio=ratio, under=under)
 

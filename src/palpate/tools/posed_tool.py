@@ -144,7 +144,7 @@ class PosedTool:
         return [(self, np.asarray(x, dtype=float))]
 
     def front(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return centres (N, b, 3), radii (b,), both in m, and shares (b,) of its front's balls at inputs (N, 3 + k)."""
+        """Return centres (N, b, 3), radii (b,), in m, and shares (b,) of its front's balls at inputs (N, 3 + k)."""
         place, turn = self.pose(X)
         centres = place[:, None] + np.einsum("nij,bj->nbi", turn, self.balls[:, :3])
         return centres, self.balls[:, 3], self.balls[:, 4]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -28,7 +28,7 @@ from palpate.surrogates import (
     NodeField,
     Surrogate,
 )
-from palpate.tools import PosedTool
+from palpate.tools import Gripper, PosedTool
 from palpate.units import Range, bounds
 from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
 
@@ -236,7 +236,11 @@ def _refuse_radius(energy: LearntEnergy | None, data: Dataset | None) -> None:
     own = energy.baseline.radius
     acting = data.provenance.get("problem", {}).get("interactions", [])
     tool = getattr(energy.baseline, "posed_tool", None)
-    tools = [PosedTool.of(a) for a in acting if isinstance(a, dict) and a.get("type") == "SurfaceTool"]
+    tools: list[PosedTool | Gripper] = [
+        PosedTool.of(a) for a in acting if isinstance(a, dict) and a.get("type") == "SurfaceTool"
+    ]
+    if isinstance(tool, Gripper):
+        tools = [replace(Gripper.of(a), trained=tool.trained) for a in acting if a.get("type") == "Pinch"]
     if any(one != tool for one in tools) or (tool is not None and not tools):
         raise UsageError(
             f"The solves were made with {tools[0] if tools else 'another probe'}, the surrogate with "

@@ -20,6 +20,7 @@ from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import NodeField
+from palpate.surrogates.baselines import require_one_tool
 from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.units import Range, bounds
 from palpate.viewer.about_record import about_record
@@ -72,6 +73,7 @@ class PageModel:
     """
 
     def __init__(self, body: Touchable, version: int = 1, centre: np.ndarray | None = None) -> None:
+        require_one_tool(body.energy.baseline, "be shown on a page")
         self.body, self.version = body, version
         self.centre = body.home if centre is None else centre
         self._line = None if body.line is None else LineDrawing(body, body.line)

@@ -282,7 +282,7 @@ class Pinch(PlainInteraction):
 
 
 class _Jaws:
-    """How both jaws come to a body, and whether a state under them is admissible."""
+    """The approach of both jaws to a body, and the verdict on a state under them."""
 
     def __init__(self, pinch: Pinch, contacts: tuple[Contact, Contact]) -> None:
         self._pinch, self._contacts = pinch, contacts

@@ -19,7 +19,7 @@ from palpate.surrogates.baselines.constant_baseline import ConstantBaseline
 from palpate.surrogates.baselines.contact_baseline import ContactBaseline, depth_series
 from palpate.surrogates.baselines.overlap_baseline import OverlapBaseline
 from palpate.surrogates.baselines.pad_baseline import PadBaseline
-from palpate.surrogates.baselines.pinch_baseline import PinchBaseline
+from palpate.surrogates.baselines.pinch_baseline import PinchBaseline, require_one_tool
 from palpate.surrogates.baselines.posed_baseline import PosedBaseline
 from palpate.surrogates.baselines.rest_stiffness import RestStiffness
 from palpate.surrogates.baselines.stiffening import Stiffening
@@ -43,4 +43,5 @@ __all__ = [
     "register_baseline",
     "registered_baselines",
     "require_ball",
+    "require_one_tool",
 ]

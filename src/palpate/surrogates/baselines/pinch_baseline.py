@@ -1,6 +1,6 @@
 """Two rigid jaws that close on a body: U₀ = U₀(s₁) + U₀(s₂), the contact law at the mean depth of each jaw's balls.
 
-The inputs are the centre c between the jaws and their opening w. The jaws' places are c ± w/2 e with the axis e, so of a
+The inputs are the centre c between the jaws and their opening w. The jaws' places are c ± w/2 e, e the axis, so of a
 jaw's depth with ∂s/∂p the derivatives by w are ±½ e·∂s/∂p. Each depth is that of `PosedBaseline`, of balls whose
 orientation stays. The stated coordinate is the depth of the deeper jaw.
 
@@ -18,8 +18,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.kernels import for_rows, part
-from palpate.surrogates.baselines.baseline import register_baseline
+from palpate.surrogates.baselines.baseline import Baseline, register_baseline
 from palpate.surrogates.baselines.contact_baseline import ContactBaseline
 from palpate.surrogates.baselines.posed_baseline import (
     ROWS,
@@ -43,7 +44,7 @@ from palpate.surrogates.surface import TouchedSurface
 from palpate.tools import Gripper
 from palpate.units import Range
 
-__all__ = ["PinchBaseline"]
+__all__ = ["PinchBaseline", "require_one_tool"]
 
 _TWICE, _FACTOR, _LENGTH = range(3)  # places in the numbers of a contact
 
@@ -170,6 +171,30 @@ class PinchBaseline(PosedBaseline):
         ways = ContactBaseline.finest(self, inputs)
         ways[3] = 2 * ways[0]
         return ways
+
+
+def require_one_tool(baseline: Baseline, what: str) -> None:
+    """Refuse a body under two jaws.
+
+    Parameters
+    ----------
+    baseline : Baseline
+        Of the body.
+    what : str
+        Verb and object of what it can't do, in words, such as "have friction".
+
+    Raises
+    ------
+    UsageError
+        For two jaws.
+    """
+    if not isinstance(baseline, PinchBaseline):
+        return
+    raise UsageError(
+        f"A body under a {baseline.posed_tool} can't {what} yet.",
+        why="Its place is the middle between two jaws, and no point of one tool.",
+        fix="Ask it in Python or by `palpate ask`, feel it by `palpate run`, or take it as C, library or FMU.",
+    )
 
 
 @part

@@ -190,7 +190,7 @@ def _turn_into(angles, own, scratch) -> None:  # type: ignore[no-untyped-def]  #
 
 
 @part
-def depth_into(place, slope, bend, numbers, surface, balls, scratch):  # type: ignore[no-untyped-def]  # noqa: ANN001
+def depth_into(place, slope, bend, numbers, surface, balls, scratch):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201
     """Mean depth s at a place (3,) in the orientation in scratch, −∂s/∂p and −∂²s/∂p²; the least gap where all miss."""
     R, D, at, n = scratch[TURN], scratch[_BALL_BEND], scratch[_LINES, 1], scratch[_LINES, 2]
     order, scale = numbers[_ORDER], numbers[_SCALE]

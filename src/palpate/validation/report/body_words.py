@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.format import length, plain, pressure, share
-from palpate.tools import PosedTool
+from palpate.tools import Gripper, PosedTool
 
 __all__ = ["LINEAR", "body_words", "solid_words", "strain_words"]
 
@@ -66,6 +66,10 @@ def _acting(item: Any) -> str:
     if item.get("type") == "SurfaceTool":
         tool = PosedTool.of(item)
         return f"pressed at {item.get('touches')} by a {tool}, {shallow:.3g} to {deep:.3g} mm deep"
+    if item.get("type") == "Pinch":
+        return (
+            f"pinched at {item.get('touches')} by a {Gripper.of(item)}, {shallow:.3g} to {deep:.3g} mm deep"
+        )
     if not isinstance(item.get("radius"), (int, float)):
         return ""
     size = f"of radius {length(item['radius'])}"

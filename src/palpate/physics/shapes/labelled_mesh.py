@@ -313,7 +313,7 @@ def _notes(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, 
         if thick < spacing or abs(there - wanted) > TELLS * wanted:
             told.append(
                 f"{name} is about {millimetres(thick)} thick, and elements {millimetres(spacing)}: {said}, but "
-                f"layers thinner than an element come out ragged. Elements of {millimetres(KEEPS * thick)} keep them, and "
-                "take longer."
+                "layers thinner than an element come out ragged. "
+                f"Elements of {millimetres(KEEPS * thick)} keep them, and take longer."
             )
     return told

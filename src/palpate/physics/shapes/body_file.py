@@ -22,7 +22,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
-from palpate.file_kinds import DICOM_ENDING, PART_FORMATS, part_ending, way_for
+from palpate.file_kinds import DICOM_ENDING, PART_FORMATS, part_ending, part_kind, way_for
 from palpate.files import TemporaryFolder
 from palpate.input_files import read_input
 from palpate.physics.advice import advise
@@ -117,7 +117,7 @@ def _for_meshio(path: str, content: bytes | None) -> Iterator[str]:
 
 def digest_of(path: str) -> str:
     """Return SHA-256 of the content of a file and those that it names, as hexadecimal digits; refuse what is empty."""
-    if Path(path).is_dir():
+    if Path(path).is_dir() and part_kind(path) == "scan":  # of DICOM slices
         content = b"a folder"
     else:
         require_file(path)

@@ -45,6 +45,7 @@ BENCHMARKS = (
     "refinement",
     "runtime",
     "scale",
+    "scans",
     "simulator_forces",
     "stability",
     "streams",

@@ -19,6 +19,31 @@ def write_labels(path, labels, spacing=(1.0, 1.0, 1.0), axes=None, origin=None):
     return Path(path)
 
 
+def write_series(folder, path):
+    """Write the slices of a labelmap's file as a DICOM series into a folder; return the folder."""
+    image = SimpleITK.Cast(SimpleITK.ReadImage(str(path)), SimpleITK.sitkUInt8)
+    Path(folder).mkdir()
+    writer = SimpleITK.ImageFileWriter()
+    writer.KeepOriginalImageUIDOn()
+    rows = np.array(image.GetDirection()).reshape(3, 3).T
+    for k in range(image.GetSize()[2]):
+        piece = image[:, :, k]
+        header = {
+            "0008|0060": "OT",
+            "0008|0018": f"1.2.3.4.{k}",
+            "0020|000d": "1.2.3",
+            "0020|000e": "1.2.3.4",
+            "0020|0032": "\\".join(map(str, image.TransformIndexToPhysicalPoint((0, 0, k)))),
+            "0020|0037": "\\".join(f"{value:.12f}" for value in rows[:2].ravel()),
+        }
+        for key, value in header.items():
+            piece.SetMetaData(key, value)
+        # names in another order than the slices
+        writer.SetFileName(str(Path(folder) / f"{(7 * k) % 101:03d}.dcm"))
+        writer.Execute(piece)
+    return Path(folder)
+
+
 def ball_in_ball(path, spacing=(2.0, 2.0, 2.0), axes=None):
     """Write fat, 1, with a lump in it, 2; the middle of the outer ball is the origin, whatever the axes."""
     axes, spacing = np.eye(3) if axes is None else axes, np.asarray(spacing)

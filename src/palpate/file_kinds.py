@@ -10,6 +10,7 @@ from pathlib import Path
 
 __all__ = [
     "CAD_ENDINGS",
+    "DICOM_ENDING",
     "MESH_ENDINGS",
     "PART_FORMATS",
     "SCAN_ENDINGS",
@@ -32,12 +33,15 @@ MESH_ENDINGS = (
 )
 """Ends of the names of files that hold a volume mesh, which keeps its elements."""
 
-SCAN_ENDINGS = (".nrrd", ".nii", ".mha", ".mhd", ".nhdr")
+DICOM_ENDING = ".dcm"
+"""End of the names of slices of a DICOM series, which stands for all of it."""
+
+SCAN_ENDINGS = (".nrrd", ".nii", ".mha", ".mhd", ".nhdr", DICOM_ENDING)
 """Ends of the names of files that hold a labelmap of a segmented scan."""
 
 PART_FORMATS = (
     "a surface (STL, OBJ, PLY, OFF, GLB, VTP), solids (STEP, IGES, BREP), a volume mesh (VTU, VTK, MSH, INP, BDF, "
-    "MED, XDMF and others), each also as NAME.gz, or the labelmap of a scan (NRRD, NIfTI, MHA)"
+    "MED, XDMF and others), each also as NAME.gz, or the labelmap of a scan (NRRD, NIfTI, MHA, a folder of DICOM)"
 )
 """Formats of parts, in words for a message."""
 
@@ -74,9 +78,11 @@ def part_ending(path: str | os.PathLike[str]) -> str:
 def part_kind(path: str | os.PathLike[str]) -> str:
     """Return what a part's file holds: "surface", "cad", "mesh" or "scan"; "" for a name that is no part's.
 
-    Of legacy VTK files, which hold either, the first lines tell it.
+    Of legacy VTK files, which hold either, the first lines tell it. A folder is a DICOM series.
     """
     ending = part_ending(path)
+    if Path(path).is_dir() and not file_kind(path):
+        return "scan"
     if ending == ".vtk" and Path(path).is_file():
         opener = gzip.open if Path(path).suffix.lower() == ".gz" else open
         with contextlib.suppress(OSError, EOFError, zlib.error), opener(path, "rb") as file:

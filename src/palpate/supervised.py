@@ -283,13 +283,15 @@ def run_in_child(
 
 
 def read_in_child(function: Callable[..., Result], path: Path, *arguments: Any) -> Result:
-    """Return what a reader in C or C++ makes of a file, read in a child process: a damaged file may crash it.
+    """Return what a reader in C or C++ makes of a file or folder in a child process: a damaged file may crash it.
 
     Time and memory that it may take grow with the file's size. The reader is defined at the top of a module; it takes
     the path and the arguments.
     """
-    require_input(path)
-    size = path.stat().st_size
+    parts = sorted(path.iterdir()) if path.is_dir() else [path]
+    for part in parts:
+        require_input(part)
+    size = sum(part.stat().st_size for part in parts)
     limit, memory = _READ_SECONDS + size / _READ_RATE, _READ_MEMORY + _READ_GROWTH * size
     try:
         return run_in_child(function, path, *arguments, limit=limit, memory=memory)

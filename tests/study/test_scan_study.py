@@ -9,10 +9,12 @@ import pytest
 from palpate.errors import UsageError
 from palpate.study import read_study
 from palpate.study.part_choices import chosen_study, shown_part
-from palpate.study.part_study import part_study, part_text
+from palpate.study.part_records import PartSurfaceRecord
+from palpate.study.part_study import part_study, part_text, study_file
+from palpate.study.part_work import rough_study
 from palpate.study.region_choices import RegionMaterial, read_labels
 from palpate.viewer.shown_part import as_wish, choices_of
-from scanned import ball_in_ball
+from scanned import ball_in_ball, write_series
 
 POISSON = 0.45
 
@@ -96,3 +98,21 @@ def test_labels_are_for_scans(tmp_path):
 
     with pytest.raises(UsageError, match="are for scans"):
         part_study(write_sample_part(tmp_path / "kidney.stl"), labels="fat=1")
+
+
+def test_a_folder_of_dicom_slices_is_a_part_with_its_study_beside_it(study, tmp_path):
+    folder = write_series(tmp_path / "series", study.body.file)
+    typed = {"labels": "fat=1,lump=2", "element": "5 mm"}
+    again = part_study(folder, radius=0.010, **typed)[0]
+    path = study_file(folder)
+    assert path == tmp_path / "series.toml"
+    path.write_text(part_text(again, ()), encoding="utf-8")
+    assert read_study(path).body.bare() == again.body.bare()
+
+
+def test_the_rough_study_has_larger_elements_in_the_tissues_unless_triangles_were_picked(study):
+    rough = rough_study(study)
+    assert rough.body.element == rough.sweep.element == study.interaction.radius > study.body.element
+    picked = PartSurfaceRecord(name="picked", triangles="0-3 of 5120")
+    body = study.body.model_copy(update={"surfaces": (picked,)})
+    assert rough_study(study.model_copy(update={"body": body})) is None

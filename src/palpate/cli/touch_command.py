@@ -70,7 +70,7 @@ def touch(
             fix="Add --view, or leave --device out.",
         )
     file = study_file(part, choices.name)
-    if not part.is_file() and (is_shown or not file.exists()):
+    if not part.exists() and (is_shown or not file.exists()):
         raise UsageError(f"There is no file {part}.", fix=f"Name {PART_FORMATS}.")
     options = ImprovementOptions(until=until, limit=60 * minutes, workers=workers)
     with (

@@ -1,5 +1,6 @@
 """Labelmaps of scans: the mesh lies where the voxels are, keeps their volumes, and is one at interfaces."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from palpate.physics.advice import ModelWarning
 from palpate.physics.shapes.label_surface import label_surface
 from palpate.physics.shapes.labelled_mesh import UPWARDS, turn_upwards
 from palpate.physics.shapes.scan_file import LabelImage, clear_specks, name_labels, read_scan
-from scanned import INNER, OUTER, UP, ball_in_ball, write_labels
+from scanned import INNER, OUTER, UP, ball_in_ball, write_labels, write_series
 
 NAMES = {"fat": 1, "lump": 2}
 SIDES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -54,6 +55,20 @@ class TestMesh:
         assert np.sqrt((away**2).mean()) < 0.5e-3  # a quarter of a voxel
         outer = np.linalg.norm(mesh.points[np.unique(mesh.triangles)], axis=1) - 1e-3 * OUTER
         assert np.sqrt((outer**2).mean()) < 0.5e-3
+
+    @pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.3, -0.7, 0.4)])
+    def test_terraces_leave_a_ball_round_where_it_faces_an_axis(self, shift):
+        voxel = 2.0  # mm
+        places = voxel * (np.moveaxis(np.indices((26, 26, 26)), 0, -1) - 12.5) - shift
+        labels = (np.linalg.norm(places, axis=-1) < OUTER).astype(int)
+        origin = 1e-3 * (np.full(3, -12.5 * voxel) - shift)
+        image = LabelImage(labels, np.full(3, 1e-3 * voxel), np.eye(3), origin, {"fat": 1})
+        surface = label_surface(image, 2.5e-3)
+        centres = 1e3 * surface.points[surface.triangles].mean(axis=1)
+        outside = np.linalg.norm(centres, axis=1) - OUTER
+        for axis in (*np.eye(3), *-np.eye(3)):  # under as much of a pole as a ball touches
+            near = np.linalg.norm(centres - OUTER * axis, axis=1) < 0.15 * OUTER
+            assert abs(outside[near].mean()) < voxel / 10
 
     def test_the_same_file_gives_the_same_mesh(self, scan):
         again = ImportedScan(scan.path, (("fat", 1), ("lump", 2)), 4e-3)
@@ -101,6 +116,73 @@ class TestPlaces:
             assert turned.origin == pytest.approx([0, 0, 1])
             assert turned.axes.T @ turned.axes == pytest.approx(np.eye(3))
             assert np.linalg.det(turned.axes) == pytest.approx(1)
+
+
+class TestSeries:
+    @pytest.fixture
+    def oblique(self, tmp_path):
+        path = ball_in_ball(tmp_path / "balls.nrrd", (1.5, 2.0, 3.0), turn(0.7))
+        return path, write_series(tmp_path / "series", path)
+
+    def test_a_folder_and_a_slice_in_it_are_the_volume_with_its_oblique_axes(self, oblique):
+        path, folder = oblique
+        volume = read_scan(str(path))
+        for name in (folder, next(folder.iterdir())):
+            series = read_scan(str(name))
+            assert np.array_equal(series.labels, volume.labels)
+            assert series.spacing == pytest.approx(volume.spacing, rel=1e-6)
+            assert series.axes == pytest.approx(volume.axes, abs=1e-6)
+            assert series.origin == pytest.approx(volume.origin, abs=1e-8)
+
+    def test_the_content_of_all_slices_is_that_of_the_body(self, oblique):
+        folder = oblique[1]
+        first = ImportedScan(str(folder), NAMES).digest
+        (folder / "021.dcm").unlink()
+        assert ImportedScan(str(folder), NAMES).digest != first
+
+    def test_a_missing_slice_is_said_with_its_place_in_mm(self, oblique):
+        (oblique[1] / "035.dcm").unlink()
+        with pytest.raises(UsageError, match="not evenly spaced") as error:
+            read_scan(str(oblique[1]))
+        assert "028.dcm to 042.dcm" in error.value.why
+        assert "6 mm, and 3 mm between others" in error.value.why
+
+    def test_a_folder_of_two_series_or_none_is_refused(self, oblique, tmp_path):
+        (tmp_path / "empty").mkdir()
+        with pytest.raises(UsageError, match="holds no DICOM series"):
+            read_scan(str(tmp_path / "empty"))
+        piece = SimpleITK.ReadImage(str(next(oblique[1].iterdir())))
+        piece.SetMetaData("0020|000e", "1.2.3.5")
+        SimpleITK.WriteImage(piece, str(oblique[1] / "other.dcm"))
+        with pytest.raises(UsageError, match="holds 2 DICOM series"):
+            read_scan(str(oblique[1]))
+
+
+def test_two_placements_of_a_nifti_header_that_differ_are_told_in_mm_and_voxels(tmp_path):
+    path = ball_in_ball(tmp_path / "balls.nii", (1.5, 2.0, 3.0), turn(0.7))
+    assert read_scan(str(path)).notes == ()
+    header = bytearray(path.read_bytes())
+    (across,) = struct.unpack_from("<f", header, 268)  # qoffset_x
+    struct.pack_into("<f", header, 268, across + 6.0)
+    path.write_bytes(header)
+    (note,) = read_scan(str(path)).notes
+    assert "6 mm (4 voxels) apart" in note
+
+
+class TestThinLayers:
+    @pytest.mark.parametrize(("layers", "element"), [(1, 1.4e-3), (2, 2.8e-3)])
+    def test_a_skin_of_few_voxels_stays_whole_where_elements_are_as_small(self, layers, element):
+        reach, voxel = 8, 2.0  # voxels; mm
+        away = np.linalg.norm(np.indices((22, 22, 22)) - 10.5, axis=0)
+        labels = np.where(away < reach - layers, 1, np.where(away < reach, 2, 0))
+        image = LabelImage(labels, np.full(3, 1e-3 * voxel), np.eye(3), np.zeros(3), {"fat": 1, "skin": 2})
+        surface = label_surface(image, element)
+        outer = surface.outside == 0
+        assert set(surface.inside[outer].tolist()) == {2}  # fat shows nowhere
+        corners = surface.points[surface.triangles]
+        flow = np.einsum("ti,ti->t", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) / 6
+        volume = flow[surface.inside == 2].sum() - flow[surface.outside == 2].sum()
+        assert volume == pytest.approx(image.volumes["skin"], rel=0.02)
 
 
 class TestRepairs:

@@ -22,7 +22,7 @@ import numpy as np
 
 from palpate import checks
 from palpate.errors import FileFormatError, UsageError
-from palpate.file_kinds import PART_FORMATS, part_ending, way_for
+from palpate.file_kinds import DICOM_ENDING, PART_FORMATS, part_ending, part_kind, way_for
 from palpate.files import TemporaryFolder
 from palpate.input_files import read_input
 from palpate.physics.advice import advise
@@ -75,9 +75,13 @@ def require_unit(unit: Any) -> None:
 
 
 def named_files(path: str) -> tuple[Path, ...]:
-    """Files that are read together with a file: TetGen's others, an XDMF file's or scan's numbers, included ones."""
+    """Files that are read together with a file: TetGen's others, an XDMF file's or scan's numbers, a DICOM series."""
     file = Path(path)
     ending = part_ending(path)
+    if file.is_dir():
+        return tuple(sorted(other for other in file.iterdir() if other.is_file()))
+    if ending == DICOM_ENDING:
+        return tuple(sorted(other for other in file.parent.iterdir() if part_ending(other) == ending))
     if ending in TETGEN:
         return tuple(tetgen_file(path, other) for other in TETGEN if other != ending)
     if ending not in _NAMED:
@@ -113,8 +117,11 @@ def _for_meshio(path: str, content: bytes | None) -> Iterator[str]:
 
 def digest_of(path: str) -> str:
     """Return SHA-256 of the content of a file and those that it names, as hexadecimal digits; refuse what is empty."""
-    require_file(path)
-    content = Path(path).read_bytes()
+    if Path(path).is_dir() and part_kind(path) == "scan":  # of DICOM slices
+        content = b"a folder"
+    else:
+        require_file(path)
+        content = Path(path).read_bytes()
     if not content.strip():
         raise FileFormatError(
             f"The file {path} is empty.", why="It has no content.", fix="Export the shape again."

@@ -50,6 +50,7 @@ CUBES = 2000  # of an element's edge that fill the body, where no size is given:
 COARSER = 1.5  # largest element inside over that of the surfaces
 LENGTH = 100.0  # longest side in the units in which Netgen meshes: its tolerances are those of millimetres
 TELLS = 0.05  # difference of a tissue's volume from that of its voxels, which is told
+KEEPS = 0.7  # of a layer's thickness: elements that leave it whole
 LOST = 0.5  # share of a tissue's volume below which the mesh is refused
 CUT = 0.75  # of an element: nearer to the end of the image, a surface is that of a cut
 STRAIGHT = 0.7  # cosine of the angle to the image's axis within which a triangle faces the end
@@ -57,7 +58,7 @@ STRAIGHT = 0.7  # cosine of the angle to the image's axis within which a triangl
 
 @dataclass(frozen=True)
 class ImportedScan(Shape):
-    """The labelled tissues of a scan: NRRD, NIfTI or MetaImage. Needs SimpleITK: ``pip install 'palpate[scan]'``.
+    """The labelled tissues of a scan: NRRD, NIfTI, MetaImage, DICOM. Needs SimpleITK: ``pip install 'palpate[scan]'``.
 
     Regions are the labels. Tissues share the nodes between them, and keep the volume of their voxels. Surfaces are the
     outer ones of each label, ``fat surface``, and ``cut`` where the body reaches the end of the image. Spacing,
@@ -66,7 +67,7 @@ class ImportedScan(Shape):
     Attributes
     ----------
     path : str
-        The file.
+        The file, or the folder of a DICOM series; a slice (``.dcm``) stands for its series.
     labels : mapping of str to int, or tuple of pairs
         Names of the numbers that belong to the body; what else the file holds is left out. By default all numbers but
         0, by the names that the file states or as ``label 1``, ``label 2``, ….
@@ -229,12 +230,15 @@ def _fill(path: str, surface: LabelSurface, spacing: float) -> tuple[np.ndarray,
         mesh.AddElements(dim=2, index=index, data=np.ascontiguousarray(rows, dtype=np.int32), base=0)
     try:
         mesh.GenerateVolumeMesh(maxh=COARSER * spacing * scale, grading=GRADING, nthreads=THREADS)
+        failure = "" if len(mesh.Elements3D()) else "it gave up"  # which it may without an exception
     except NgException as error:
+        failure = str(error).strip()
+    if failure:
         raise UsageError(
-            f"Netgen could not mesh the tissues of {path}: {str(error).strip()}.",
+            f"Netgen could not mesh the tissues of {path}: {failure}.",
             why=f"A layer or gap is thinner than the elements of {millimetres(spacing)}.",
             fix="Choose smaller elements, or smooth the labels in the program that made them.",
-        ) from error
+        )
     solid = mesh.Elements3D().NumPy()
     tetrahedra = solid["nodes"][:, :4].astype(np.int64) - 1
     points = np.asarray(mesh.Coordinates()) / scale
@@ -296,21 +300,20 @@ def _notes(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, 
     sizes = np.linalg.norm(surface.area_vectors, axis=1)
     for number, (name, wanted) in enumerate(image.volumes.items(), 1):
         there = mesh.region_volumes.get(name, 0.0)
+        around = sizes[(surface.inside == number) | (surface.outside == number)].sum()
+        # of a layer; of other shapes about as much as of a layer as thick as they
+        thick = 2 * wanted / max(around, 1e-12)
         said = f"{1e6 * there:.3g} ml of {name} in the mesh, {1e6 * wanted:.3g} ml in the voxels"
         if there < LOST * wanted:
             raise UsageError(
                 f"Elements of {millimetres(spacing)} are too large for {name!r} in {path}.",
                 why=f"It is too thin: {said}.",
-                fix=f"Choose smaller ones, such as {millimetres(spacing / 2)}, or leave the label out.",
+                fix=f"Choose smaller ones, such as {millimetres(KEEPS * thick)}, or leave the label out.",
             )
-        around = sizes[(surface.inside == number) | (surface.outside == number)].sum()
-        thick = (
-            2 * wanted / around
-        )  # of a layer; of other shapes about as much as of a layer as thick as they
         if thick < spacing or abs(there - wanted) > TELLS * wanted:
             told.append(
-                f"{name} is about {millimetres(thick)} thick, and elements {millimetres(spacing)}: {said}, but layers "
-                f"thinner than an element come out ragged. Elements of {millimetres(0.7 * thick)} keep them, and take "
-                "longer."
+                f"{name} is about {millimetres(thick)} thick, and elements {millimetres(spacing)}: {said}, but "
+                "layers thinner than an element come out ragged. "
+                f"Elements of {millimetres(KEEPS * thick)} keep them, and take longer."
             )
     return told

@@ -1,4 +1,4 @@
-"""Labelmaps of segmented scans: NRRD, NIfTI and MetaImage files as voxels with a number for each tissue.
+"""Labelmaps of segmented scans: NRRD, NIfTI and MetaImage files, DICOM series, as voxels with their tissues.
 
 LabelImage    labels, size of a voxel, directions and origin, in m
 read_scan     reads a file by SimpleITK, in a child process
@@ -9,6 +9,7 @@ clear_specks  removes specks and fills pinholes, and tells of islands
 from __future__ import annotations
 
 import gzip
+import math
 import re
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
@@ -17,8 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from palpate.errors import FileFormatError, UsageError
-from palpate.file_kinds import SCAN_ENDINGS, part_ending
+from palpate.file_kinds import DICOM_ENDING, SCAN_ENDINGS, part_ending
 from palpate.format import millimetres
+from palpate.physics.shapes.dicom_series import read_series
 from palpate.physics.shapes.naming import plain_name
 from palpate.supervised import read_in_child
 
@@ -26,6 +28,7 @@ __all__ = ["LabelImage", "clear_specks", "name_labels", "read_scan"]
 
 MOST_LABELS = 64  # different numbers that a labelmap of tissues has at most; an image of grey values has more
 SPECK = 8  # voxels: pieces of fewer are noise of the segmentation, and no mesh can hold them
+PLACED = 0.1  # of a voxel: placements that are nearer are the same
 UNCLEAR = np.iinfo(np.int32).min  # stands for no label while specks are given away
 LISTED = 12  # numbers that a message names, at most
 HEAD = 65_536  # bytes at a file's beginning among which its header states the size of a voxel
@@ -99,7 +102,8 @@ def _read(path: Path) -> LabelImage:
 
     SimpleITK.ProcessObject.SetGlobalWarningDisplay(False)
     try:
-        image = SimpleITK.ReadImage(str(path))
+        is_series = path.is_dir() or part_ending(path) == DICOM_ENDING
+        image = read_series(path) if is_series else SimpleITK.ReadImage(str(path))
     except RuntimeError as error:
         said = str(error).strip().rpartition("\n")[2].strip() or "ITK reports an error"
         raise FileFormatError(
@@ -118,8 +122,40 @@ def _read(path: Path) -> LabelImage:
             why=f"Their sizes are {', '.join(map(millimetres, spacing))}, their axes {axes.T.round(3).tolist()}.",
             fix="Save it again with its spacing and directions, in the program that made it.",
         )
-    names = _segment_names({key: image.GetMetaData(key) for key in image.GetMetaDataKeys()})
-    return LabelImage(labels, spacing, axes, 1e-3 * np.array(image.GetOrigin()[:3]), names)
+    header = {key: image.GetMetaData(key) for key in image.GetMetaDataKeys()}
+    origin = 1e-3 * np.array(image.GetOrigin()[:3])
+    return LabelImage(
+        labels, spacing, axes, origin, _segment_names(header), _nifti_notes(header, labels.shape)
+    )
+
+
+def _nifti_notes(header: dict[str, str], shape: tuple[int, ...]) -> tuple[str, ...]:
+    """Return a sentence where the two placements that a NIfTI header can state put a corner of the image apart."""
+    if "0" in {header.get("qform_code", "0"), header.get("sform_code", "0")}:
+        return ()
+    x, y, z = (float(header[f"quatern_{letter}"]) for letter in "bcd")
+    w = math.sqrt(max(0.0, 1.0 - x * x - y * y - z * z))
+    turn = np.array(
+        [
+            [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), w * w + y * y - x * x - z * z, 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w + z * z - x * x - y * y],
+        ]
+    )
+    size = np.array([float(header[f"pixdim[{d}]"]) for d in (1, 2, 3)])
+    linear = np.array([[float(word) for word in header[f"srow_{axis}"].split()] for axis in "xyz"])
+    offset = np.array([float(header[f"qoffset_{axis}"]) for axis in "xyz"])
+    ends = np.stack(np.meshgrid(*[(0, n - 1) for n in shape], indexing="ij"), axis=-1).reshape(-1, 3)
+    # the third axis of the quaternion is turned round where the header's voxels are left-handed
+    size[2] *= np.sign(np.linalg.det(linear[:, :3])) * np.sign(np.linalg.det(turn))
+    apart = ends @ (linear[:, :3] - turn * size).T + linear[:, 3] - offset
+    far = float(np.linalg.norm(apart, axis=1).max())
+    if far <= PLACED * float(np.abs(size).min()):
+        return ()
+    return (
+        f"The header's sform and qform put a corner of the image {far:.3g} mm ({far / np.abs(size).min():.2g} voxels) "
+        "apart; ITK's choice was taken, the sform unless it is skew.",
+    )
 
 
 def _require_volume(path: Path, image: object, labels: np.ndarray) -> None:

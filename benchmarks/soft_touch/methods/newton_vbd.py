@@ -40,7 +40,8 @@ class _Vbd:
         self._wp, self.seconds, self._contact = wp, step, contact
         self._radius, self._skin = case.radius - skin, skin
         young, poisson = (
-            np.array([m[key] for m in case.materials.values()])[case.mesh["label"]] for key in ("young", "poisson")
+            np.array([m[key] for m in case.materials.values()])[case.mesh["label"]]
+            for key in ("young", "poisson")
         )
         builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
         builder.add_soft_mesh(
@@ -66,7 +67,10 @@ class _Vbd:
         self._model.soft_contact_ke, self._model.soft_contact_kd = contact, 0.0
         self._model.soft_contact_mu = 0.0
         self._solver = newton.solvers.SolverVBD(
-            self._model, iterations=iterations, integrate_with_external_rigid_solver=True
+            self._model,
+            iterations=iterations,
+            integrate_with_external_rigid_solver=True,
+            particle_enable_tile_solve=False,  # tiles are for graphics cards
         )
         self._pipeline = newton.CollisionPipeline(self._model, soft_contact_margin=2.0 * skin + 1e-3)
         self._contacts, self._control = self._pipeline.contacts(), self._model.control()
@@ -95,6 +99,10 @@ class _Vbd:
 def load(case: Any, **setting: Any) -> SteppedBall:
     """Return the method; `setting` is one of `SETTINGS`."""
     used = {"skin": 1e-3, "damping": 0.0, **(setting or BEST)}
-    words = f"step {1e3 * used['step']:g} ms, {used['iterations']} iterations, contact {used['contact']:g} N/m"
-    words += f", skin {1e3 * used['skin']:g} mm" + f", damping {used['damping']:g} Pa s" * (used["damping"] != 0.0)
+    words = (
+        f"step {1e3 * used['step']:g} ms, {used['iterations']} iterations, contact {used['contact']:g} N/m"
+    )
+    words += f", skin {1e3 * used['skin']:g} mm" + f", damping {used['damping']:g} Pa s" * (
+        used["damping"] != 0.0
+    )
     return SteppedBall(_Vbd(case, **used), case, words)

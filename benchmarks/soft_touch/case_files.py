@@ -25,6 +25,7 @@ __all__ = [
 ]
 
 CASES = Path(__file__).parent / "cases"
+ORACLE = ("fx", "fy", "fz", "kn", "energy", "force_error", "stiffness_error", "energy_error")
 GOING_IN = 0.5, 20  # radii from which a closed path is come to, and places on the way
 
 
@@ -110,26 +111,28 @@ def case_names(folder: Path = CASES) -> list[str]:
     return sorted(path.parent.name for path in folder.glob("*/oracle.csv"))
 
 
-def read_case(name: str, folder: Path = CASES) -> Case:
-    """Read a case."""
+def read_case(name: str, folder: Path = CASES, *, blind: bool = False) -> Case:
+    """Read a case; a blind one has no oracle, all of whose values are not-a-number."""
     place = folder / name
-    if not (place / "oracle.csv").is_file():
-        raise JudgeError(
-            f"There is no case {name!r}.", fix=f"Cases are {', '.join(case_names(folder)) or 'missing'}."
-        )
-    description = tomllib.loads((place / "case.toml").read_text("utf-8"))
+    if not (place / ("presses.csv" if blind else "oracle.csv")).is_file():
+        names = ", ".join(case_names(folder))
+        raise JudgeError(f"There is no case {name!r}.", fix=f"Cases are {names or 'missing'}.")
     presses = columns_of(place / "presses.csv")
-    oracle = columns_of(place / "oracle.csv")
+    if blind:
+        unknown = np.full(len(presses["press"]), np.nan)
+        oracle = dict.fromkeys(ORACLE, unknown) | {"press": presses["press"]}
+    else:
+        oracle = columns_of(place / "oracle.csv")
     order = order_of(presses["press"], oracle["press"], place / "oracle.csv")
     return Case(
         place,
-        description,
+        tomllib.loads((place / "case.toml").read_text("utf-8")),
         [int(press) for press in presses["press"]],
         presses["path"].astype(int),
         *(vectors_of(presses, names) for names in ("x y z", "nx ny nz")),
         presses["depth"],
         vectors_of(oracle, "fx fy fz")[order],
-        *(oracle[key][order] for key in ("kn", "energy", "force_error", "stiffness_error", "energy_error")),
+        *(oracle[key][order] for key in ORACLE[3:]),
         _loops(place / "loops.csv"),
     )
 

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 if __package__:
-    from .case_files import CASES, read_case
+    from .case_files import CASES, case_names, read_case
     from .judge import FIGURES, compare, figure_text
 else:  # beside judge.py as a file
-    from case_files import CASES, read_case
+    from case_files import CASES, case_names, read_case
     from judge import FIGURES, compare, figure_text
 
 __all__ = ["ANSWERS", "METHODS", "draw", "standings", "standings_text", "sweep_rows"]
@@ -43,7 +43,7 @@ def standings(
         found = []
         for method, title in METHODS.items():
             kept = _kept(method)["cases"].get(name)
-            if kept is not None:
+            if kept is not None and "best" in kept:
                 figures = compare(kept["best"], case)
                 found.append({"case": name, "method": title, "settings": kept["best"]["settings"], **figures})
         for title, figures in (further or {}).items():
@@ -73,13 +73,21 @@ def standings_text(rows: list[dict[str, Any]]) -> str:
 
 
 def sweep_rows() -> list[dict[str, Any]]:
-    """Return a row for each setting of each method on each case, in the order in which they were asked."""
-    return [
-        {"method": title, "case": case, **row}
-        for method, title in METHODS.items()
-        for case, kept in _kept(method)["cases"].items()
-        for row in kept["sweep"]
-    ]
+    """Return a row for each setting of each method on each case that has an oracle, in the order of the sweep."""
+    rows = []
+    for method, title in METHODS.items():
+        for name, kept in _kept(method)["cases"].items():
+            if name in case_names():
+                case = read_case(name, CASES)
+                for row in kept["sweep"]:
+                    words = {
+                        "method": title,
+                        "case": name,
+                        "settings": row["settings"],
+                        "seconds": row["seconds"],
+                    }
+                    rows.append(compare(row, case) | words)
+    return rows
 
 
 def sources() -> dict[str, str]:

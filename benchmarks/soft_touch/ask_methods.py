@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import math
 import sys
 import time
 from collections.abc import Iterator
@@ -48,7 +49,7 @@ def sweep(name: str, case: Case, kept: list[dict[str, Any]]) -> Iterator[dict[st
 
 def best_setting(case: Case, kept: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the setting whose median force error is least."""
-    return dict(min(kept, key=lambda row: compare(row, case)["jnd_median"] or 0.0)["setting"])
+    return dict(min(kept, key=lambda row: compare(row, case)["jnd_median"] or math.inf)["setting"])
 
 
 def settings_of(name: str, case: Case) -> list[dict[str, Any]]:
@@ -95,9 +96,10 @@ def ask(name: str, case: str, kept: dict[str, Any], paths: int) -> Iterator[dict
     if case not in case_names() or not kept["sweep"]:
         return
     whole = read_case(case)
-    setting = best_setting(whole, kept["sweep"])
-    if kept.get("best", {}).get("setting") != setting:
-        answers = question(load(name, whole, setting), _first_paths(whole, paths))
+    setting, asked = best_setting(whole, kept["sweep"]), _first_paths(whole, paths)
+    before = kept.get("best", {})
+    if before.get("setting") != setting or before["press"] != asked.presses:
+        answers = question(load(name, whole, setting), asked)
         kept["best"] = {"setting": setting, **answers}
         yield kept
 

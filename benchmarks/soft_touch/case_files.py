@@ -112,7 +112,10 @@ def case_names(folder: Path = CASES) -> list[str]:
 
 
 def read_case(name: str, folder: Path = CASES, *, blind: bool = False) -> Case:
-    """Read a case; a blind one has no oracle, all of whose values are not-a-number."""
+    """Read a case with the presses that its oracle has.
+
+    A blind one has all presses, and not-a-number for the oracle's values.
+    """
     place = folder / name
     if not (place / ("presses.csv" if blind else "oracle.csv")).is_file():
         names = ", ".join(case_names(folder))
@@ -123,6 +126,8 @@ def read_case(name: str, folder: Path = CASES, *, blind: bool = False) -> Case:
         oracle = dict.fromkeys(ORACLE, unknown) | {"press": presses["press"]}
     else:
         oracle = columns_of(place / "oracle.csv")
+    solved = np.isin(presses["press"], oracle["press"])
+    presses = {key: values[solved] for key, values in presses.items()}
     order = order_of(presses["press"], oracle["press"], place / "oracle.csv")
     return Case(
         place,

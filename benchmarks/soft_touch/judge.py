@@ -204,14 +204,14 @@ def question(method: Any, case: Case, *, loops: bool = True) -> dict[str, Any]:
 
 
 def compare(answers: dict[str, Any], case: Case) -> dict[str, float | None]:
-    """Return the figures of answers; a press without a finite force counts as infinitely wrong."""
-    asked = case.only(answers["press"])
+    """Return the figures of answers to presses that the oracle has; one without a finite force is infinitely wrong."""
+    rows = [row for row, press in enumerate(answers["press"]) if press in set(case.presses)]
+    asked = case.only([answers["press"][row] for row in rows])
     figures: dict[str, float | None] = dict.fromkeys(FIGURES)
-    figures |= _force_figures(np.array(answers["at_presses"], dtype=float), asked)
+    figures |= _force_figures(np.array(answers["at_presses"], dtype=float)[rows], asked)
     if answers.get("deeper") is not None:
-        figures["stiffness_median"] = _stiffness_error(
-            *(np.array(answers[name], dtype=float) for name in ("deeper", "shallower")), asked
-        )
+        deeper, shallower = (np.array(answers[name], dtype=float)[rows] for name in ("deeper", "shallower"))
+        figures["stiffness_median"] = _stiffness_error(deeper, shallower, asked)
     for name in ("loop_work", "lateness", "seconds_step", "solves"):
         figures[name] = answers.get(name)
     return figures

@@ -39,7 +39,7 @@ def learn(name: str, solves: int, keep: Path) -> None:
         energy = pp.Surrogate(touch.energy, meta={"name": f"soft-touch {name}"})
         energy.save(LEARNT / f"{name}-{count}.palpate")
         rows = [row for row in np.flatnonzero(data.converged) if row not in left_out]
-        table = np.hstack([data.inputs[rows], data.response[rows]])
+        table = np.hstack([data.X[rows], data.force[rows]])
         head = "x,y,z,fx,fy,fz"
         np.savetxt(LEARNT / f"{name}-{count}.csv", table, "%.7g", ",", header=head, comments="")
 

@@ -14,9 +14,9 @@ from .stepped import NEAR, free_triangles
 __all__ = ["BEST", "SETTINGS", "load"]
 
 SETTINGS: tuple[dict[str, Any], ...] = tuple(
-    {"pad": pad, "volume": volume} for volume in (True, False) for pad in (5e5, 2e6, 1e7, 5e7)
+    {"pad": pad, "volume": volume} for volume in (True, False) for pad in (2e6, 1e7)
 )
-BEST: dict[str, Any] = SETTINGS[2]
+BEST: dict[str, Any] = SETTINGS[1]
 
 
 class _Springs:

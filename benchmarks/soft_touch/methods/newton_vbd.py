@@ -16,17 +16,14 @@ __all__ = ["BEST", "SETTINGS", "load"]
 DENSITY = 1000.0  # kg/m³: only the way to rest depends on it
 FAR = 1.0  # m, where the ball waits
 SETTINGS: tuple[dict[str, Any], ...] = (
-    *(
-        {"step": 5e-3, "iterations": iterations, "contact": contact}
-        for iterations in (10, 40)
-        for contact in (1e2, 1e3, 1e4)
-    ),
-    {"step": 2e-3, "iterations": 10, "contact": 1e3},
+    {"step": 5e-3, "iterations": 10, "contact": 1e3},
+    {"step": 5e-3, "iterations": 40, "contact": 1e3},
+    {"step": 5e-3, "iterations": 40, "contact": 1e2},
+    {"step": 5e-3, "iterations": 40, "contact": 1e4},
     {"step": 2e-2, "iterations": 40, "contact": 1e3},
     {"step": 5e-3, "iterations": 40, "contact": 1e3, "skin": 2e-3},
-    {"step": 5e-3, "iterations": 40, "contact": 1e3, "damping": 1.0},
 )
-BEST: dict[str, Any] = SETTINGS[4]
+BEST: dict[str, Any] = SETTINGS[1]
 
 
 class _Vbd:

@@ -47,6 +47,7 @@ BENCHMARKS = (
     "scale",
     "scans",
     "simulator_forces",
+    "soft_bodies",
     "stability",
     "streams",
     "surrogates",

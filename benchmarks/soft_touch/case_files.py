@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,8 @@ __all__ = [
 ]
 
 CASES = Path(__file__).parent / "cases"
-GOING_IN = 20  # places on the way to a closed path
+ORACLE = ("fx", "fy", "fz", "kn", "energy", "force_error", "stiffness_error", "energy_error")
+GOING_IN = 0.5, 20  # radii from which a closed path is come to, and places on the way
 
 
 class JudgeError(Exception):
@@ -41,7 +43,7 @@ class Case:
 
     `places` (n, 3), `normals` (n, 3), `depths` and `paths` (n,) belong to the presses, in their order; `force` (n, 3),
     `stiffness` and `energy` (n,) are the oracle's, and the three errors (n,) its own. `loops` maps the number of each
-    closed path to its places, normal and depth. `description` is case.toml.
+    closed path to its corners (m, 3). `description` is case.toml.
     """
 
     folder: Path
@@ -57,7 +59,7 @@ class Case:
     force_error: np.ndarray
     stiffness_error: np.ndarray
     energy_error: np.ndarray
-    loops: dict[int, tuple[np.ndarray, np.ndarray, float]]
+    loops: dict[int, np.ndarray]
 
     @property
     def name(self) -> str:
@@ -79,18 +81,27 @@ class Case:
         """The mesh that a method may use: points (p, 3), tetrahedra (t, 4), label (t,), fixed (p,)."""
         return read_vtu(self.folder / "mesh.vtu")
 
+    def only(self, presses: Sequence[int]) -> Case:
+        """Return the case with some of its presses alone."""
+        rows = order_of(np.array(presses), np.array(self.presses), self.folder / "presses.csv")
+        names = ("paths", "places", "normals", "depths", "force", "stiffness", "energy")
+        errors = ("force_error", "stiffness_error", "energy_error")
+        chosen = {name: getattr(self, name)[rows] for name in names + errors}
+        return replace(self, presses=list(presses), **chosen)
+
     def shift(self, share: float) -> np.ndarray:
         """Return the presses' places (n, 3) for depths that are larger by a share."""
         return np.asarray(self.places - self.normals * (share * self.depths)[:, None])
 
     def way_in(self, loop: int) -> np.ndarray:
-        """Return places (m, 3) from first touch to the first place of a closed path, in equal steps."""
-        places, normal, depth = self.loops[loop]
-        return np.asarray(places[0] + np.outer(np.linspace(depth, 0.0, GOING_IN), normal))
+        """Return places (m, 3) from outside to a closed path, along the normal of the press nearest."""
+        first = self.loops[loop][0]
+        normal = self.normals[np.argmin(np.linalg.norm(self.places - first, axis=1))]
+        return np.asarray(first + np.outer(np.linspace(GOING_IN[0] * self.radius, 0.0, GOING_IN[1]), normal))
 
     def around(self, loop: int) -> np.ndarray:
         """Return the corners of a closed path and the middles of its sides in turn, ending where it began."""
-        corners = self.loops[loop][0]
+        corners = self.loops[loop]
         middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
         return np.concatenate([np.stack([corners, middles], 1).reshape(-1, 3), corners[:1]])
 
@@ -100,38 +111,43 @@ def case_names(folder: Path = CASES) -> list[str]:
     return sorted(path.parent.name for path in folder.glob("*/oracle.csv"))
 
 
-def read_case(name: str, folder: Path = CASES) -> Case:
-    """Read a case."""
+def read_case(name: str, folder: Path = CASES, *, blind: bool = False) -> Case:
+    """Read a case with the presses that its oracle has.
+
+    A blind one has all presses, and not-a-number for the oracle's values.
+    """
     place = folder / name
-    if not (place / "oracle.csv").is_file():
-        raise JudgeError(
-            f"There is no case {name!r}.", fix=f"Cases are {', '.join(case_names(folder)) or 'missing'}."
-        )
-    description = tomllib.loads((place / "case.toml").read_text("utf-8"))
+    if not (place / ("presses.csv" if blind else "oracle.csv")).is_file():
+        names = ", ".join(case_names(folder))
+        raise JudgeError(f"There is no case {name!r}.", fix=f"Cases are {names or 'missing'}.")
     presses = columns_of(place / "presses.csv")
-    oracle = columns_of(place / "oracle.csv")
+    if blind:
+        unknown = np.full(len(presses["press"]), np.nan)
+        oracle = dict.fromkeys(ORACLE, unknown) | {"press": presses["press"]}
+    else:
+        oracle = columns_of(place / "oracle.csv")
+    solved = np.isin(presses["press"], oracle["press"])
+    presses = {key: values[solved] for key, values in presses.items()}
     order = order_of(presses["press"], oracle["press"], place / "oracle.csv")
     return Case(
         place,
-        description,
+        tomllib.loads((place / "case.toml").read_text("utf-8")),
         [int(press) for press in presses["press"]],
         presses["path"].astype(int),
         *(vectors_of(presses, names) for names in ("x y z", "nx ny nz")),
         presses["depth"],
         vectors_of(oracle, "fx fy fz")[order],
-        *(oracle[key][order] for key in ("kn", "energy", "force_error", "stiffness_error", "energy_error")),
+        *(oracle[key][order] for key in ORACLE[3:]),
         _loops(place / "loops.csv"),
     )
 
 
-def _loops(path: Path) -> dict[int, tuple[np.ndarray, np.ndarray, float]]:
+def _loops(path: Path) -> dict[int, np.ndarray]:
     rows = columns_of(path)
     loops = {}
     for loop in np.unique(rows["loop"]).astype(int):
-        chosen = rows["loop"] == loop
-        first = int(np.flatnonzero(chosen)[0])
-        normal, depth = vectors_of(rows, "nx ny nz")[first], float(rows["depth"][first])
-        loops[int(loop)] = (vectors_of(rows, "x y z")[chosen], normal, depth)
+        places = vectors_of(rows, "x y z")[rows["loop"] == loop]
+        loops[int(loop)] = places[:-1] if np.allclose(places[0], places[-1]) else places
     return loops
 
 

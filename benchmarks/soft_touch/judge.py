@@ -34,6 +34,7 @@ __all__ = [
     "JudgeError",
     "case_names",
     "delay",
+    "figure_text",
     "judge",
     "read_case",
     "read_method",
@@ -51,12 +52,12 @@ FIGURES = {
     "lateness": "lateness, ms",
     "seconds_step": "s a step",
     "solves": "solves",
-    "answered": "answered",
+    "presses": "presses answered",
 }
 """Names of the figures and their titles; one that a method can't give is None, printed as "not given"."""
 
 STEP = 1e-3  # s, between two forces of a stroke: the rate of haptic devices
-STROKE = 0.5  # s, of one press and release: 50 mm/s for 8 mm, as fast as a hand that palpates
+STROKE = 0.25  # s, of one press and release: 50 mm/s for 4 mm, as fast as a hand that palpates
 STROKE_DEPTH = 0.95  # of the deepest press, so that the oracle is never extrapolated
 PROBE_STEP = 0.05  # of the depth: central differences of d^1.5 then err by 0.01 %
 WEBER, WEBER_SMALL, SMALL = 0.07, 0.10, 1.0  # just noticeable share of a force; below 1 N
@@ -162,7 +163,12 @@ def read_method(path: Path, case: Case) -> Any:
 
 
 def judge(method: Any, case: Case) -> dict[str, float | None]:
-    """Return the figures of a method on a case.
+    """Return the figures of a method on a case, by the names of `FIGURES`."""
+    return compare(question(method, case), case)
+
+
+def question(method: Any, case: Case, *, loops: bool = True) -> dict[str, Any]:
+    """Return what a method answers, as plain data that `compare` makes figures of.
 
     Parameters
     ----------
@@ -170,26 +176,44 @@ def judge(method: Any, case: Case) -> dict[str, float | None]:
         Has `force(places (n, 3)) -> (n, 3)`, m and N, or is that function; or has the array `at_presses` (n, 3) alone.
         May have `start(place)` and `step(place, seconds) -> (3,)`, and the numbers `solves` and `seconds_step`.
     case : Case
+    loops : bool
+        Whether to ask for closed paths and for strokes, which take many steps.
 
     Returns
     -------
     dict
-        By the names of `FIGURES`. A press without a finite force counts as infinitely wrong.
+        `press` (n,), `at_presses` (n, 3), `deeper` and `shallower` (n, 3) by `PROBE_STEP` of the depth, `loop_work` in
+        %, `lateness` in ms, `seconds_step`, `solves`, `settings`; None where the method can't say.
     """
     ask = _asker(method)
-    forces = np.asarray(method.at_presses, dtype=float) if ask is None else ask(case.places)
-    figures: dict[str, float | None] = dict.fromkeys(FIGURES)
-    figures |= _force_figures(forces, case)
-    figures["solves"] = getattr(method, "solves", None)
-    figures["seconds_step"] = getattr(method, "seconds_step", None)
+    own = {name: getattr(method, name, None) for name in ("seconds_step", "solves", "settings")}
     if ask is None:
-        return figures
-    figures["stiffness_median"] = _stiffness_error(ask, case)
-    figures["loop_work"] = _largest([_loop_work(ask, case, loop) for loop in case.loops])
-    lateness, seconds = _stroke_figures(method, ask, case)
-    figures["lateness"] = lateness
-    if figures["seconds_step"] is None:
-        figures["seconds_step"] = seconds
+        return {**own, "press": case.presses, "at_presses": method.at_presses.tolist()}
+    answers = {
+        **own,
+        "press": case.presses,
+        "at_presses": ask(case.places).tolist(),
+        "deeper": ask(case.shift(PROBE_STEP)).tolist(),
+        "shallower": ask(case.shift(-PROBE_STEP)).tolist(),
+    }
+    if loops:
+        answers["loop_work"] = _largest([_loop_work(ask, case, loop) for loop in case.loops])
+        answers["lateness"], seconds = _stroke_figures(method, ask, case)
+        answers["seconds_step"] = seconds if own["seconds_step"] is None else own["seconds_step"]
+    return answers
+
+
+def compare(answers: dict[str, Any], case: Case) -> dict[str, float | None]:
+    """Return the figures of answers to presses that the oracle has; one without a finite force is infinitely wrong."""
+    rows = [row for row, press in enumerate(answers["press"]) if press in set(case.presses)]
+    asked = case.only([answers["press"][row] for row in rows])
+    figures: dict[str, float | None] = dict.fromkeys(FIGURES)
+    figures |= _force_figures(np.array(answers["at_presses"], dtype=float)[rows], asked)
+    if answers.get("deeper") is not None:
+        deeper, shallower = (np.array(answers[name], dtype=float)[rows] for name in ("deeper", "shallower"))
+        figures["stiffness_median"] = _stiffness_error(deeper, shallower, asked)
+    for name in ("loop_work", "lateness", "seconds_step", "solves"):
+        figures[name] = answers.get(name)
     return figures
 
 
@@ -227,7 +251,7 @@ def _force_figures(forces: np.ndarray, case: Case) -> dict[str, float | None]:
         "jnd_median": _quantile(jnd, 0.5),
         "jnd_p95": _quantile(jnd, 0.95),
         "direction_median": _quantile(angle[pushed], 0.5),
-        "answered": float(np.isfinite(error).mean()),
+        "presses": float(np.isfinite(error).sum()),
     }
 
 
@@ -241,8 +265,7 @@ def _largest(values: list[float | None]) -> float | None:
     return max(numbers) if numbers else None
 
 
-def _stiffness_error(ask: Callable[[np.ndarray], np.ndarray], case: Case) -> float | None:
-    deeper, shallower = ask(case.shift(PROBE_STEP)), ask(case.shift(-PROBE_STEP))
+def _stiffness_error(deeper: np.ndarray, shallower: np.ndarray, case: Case) -> float | None:
     along = np.einsum("ij,ij->i", deeper - shallower, case.normals)
     error = 100.0 * np.abs(along / (2.0 * PROBE_STEP * case.depths) / case.stiffness - 1.0)
     error[~np.isfinite(error)] = np.inf
@@ -337,11 +360,12 @@ def table_text(results: dict[str, dict[str, float | None]]) -> str:
     lines = []
     for name, figures in results.items():
         lines.append(name)
-        lines += [f"  {title:22} {_number(figures[key])}" for key, title in FIGURES.items()]
+        lines += [f"  {title:22} {figure_text(figures[key])}" for key, title in FIGURES.items()]
     return "\n".join(lines)
 
 
-def _number(value: float | None) -> str:
+def figure_text(value: float | None) -> str:
+    """Return a figure with three digits, or in words."""
     if value is None:
         return "not given"
     return "no answer" if math.isinf(value) else f"{value:.3g}"

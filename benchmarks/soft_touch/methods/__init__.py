@@ -1,1 +1,1 @@
-"""Methods that soft-touch judges, each a file with `load(case, **setting)`, `SETTINGS` and `BEST`."""
+"""Methods that soft-touch judges: files with `load(case, **setting)`, and `SETTINGS` or `settings_of(case)`."""

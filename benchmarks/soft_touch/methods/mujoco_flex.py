@@ -14,7 +14,11 @@ DENSITY = 1000.0  # kg/m³: only the way to rest depends on it
 STIFF = 'solref="0.004 1" solimp="0.99 0.999 0.0001"'
 FAR = 1.0  # m, where the ball waits
 SETTINGS: tuple[dict[str, Any], ...] = (
-    *({"step": 2e-3, "skin": skin, "stiff": stiff} for skin in (5e-4, 1e-3, 2e-3, 3e-3) for stiff in (False, True)),
+    *(
+        {"step": 2e-3, "skin": skin, "stiff": stiff}
+        for skin in (5e-4, 1e-3, 2e-3, 3e-3)
+        for stiff in (False, True)
+    ),
     {"step": 1e-3, "skin": 1e-3, "stiff": True},
     {"step": 5e-3, "skin": 1e-3, "stiff": True},
     {"step": 2e-3, "skin": 1e-3, "stiff": True, "damping": 0.1},
@@ -61,7 +65,7 @@ class _Flex:
 def _model(
     case: Any, step: float, skin: float, stiff: bool, damping: float, solver: str, material: dict[str, Any]
 ) -> Any:
-    """Return the scene with one material everywhere; the surface lies a skin farther out, the ball is as much smaller."""
+    """Return the scene with one material; the surface lies a skin farther out, the ball is as much smaller."""
     import mujoco
 
     mesh = case.mesh
@@ -83,5 +87,7 @@ def load(case: Any, **setting: Any) -> SteppedBall:
     """Return the method; `setting` is one of `SETTINGS`."""
     used = {"damping": 0.01, "solver": "CG", **(setting or BEST)}
     words = f"step {1e3 * used['step']:g} ms, skin {1e3 * used['skin']:g} mm, {used['solver']}"
-    words += ", stiff contact" * used["stiff"] + f", damping {used['damping']:g} s" * (used["damping"] != 0.01)
+    words += ", stiff contact" * used["stiff"] + f", damping {used['damping']:g} s" * (
+        used["damping"] != 0.01
+    )
     return SteppedBall(_Flex(case, **used), case, words)

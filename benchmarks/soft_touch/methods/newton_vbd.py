@@ -16,17 +16,14 @@ __all__ = ["BEST", "SETTINGS", "load"]
 DENSITY = 1000.0  # kg/m³: only the way to rest depends on it
 FAR = 1.0  # m, where the ball waits
 SETTINGS: tuple[dict[str, Any], ...] = (
-    *(
-        {"step": 5e-3, "iterations": iterations, "contact": contact}
-        for iterations in (10, 40)
-        for contact in (1e2, 1e3, 1e4)
-    ),
-    {"step": 2e-3, "iterations": 10, "contact": 1e3},
+    {"step": 5e-3, "iterations": 10, "contact": 1e3},
+    {"step": 5e-3, "iterations": 40, "contact": 1e3},
+    {"step": 5e-3, "iterations": 40, "contact": 1e2},
+    {"step": 5e-3, "iterations": 40, "contact": 1e4},
     {"step": 2e-2, "iterations": 40, "contact": 1e3},
     {"step": 5e-3, "iterations": 40, "contact": 1e3, "skin": 2e-3},
-    {"step": 5e-3, "iterations": 40, "contact": 1e3, "damping": 1.0},
 )
-BEST: dict[str, Any] = SETTINGS[4]
+BEST: dict[str, Any] = SETTINGS[1]
 
 
 class _Vbd:
@@ -40,7 +37,8 @@ class _Vbd:
         self._wp, self.seconds, self._contact = wp, step, contact
         self._radius, self._skin = case.radius - skin, skin
         young, poisson = (
-            np.array([m[key] for m in case.materials.values()])[case.mesh["label"]] for key in ("young", "poisson")
+            np.array([m[key] for m in case.materials.values()])[case.mesh["label"]]
+            for key in ("young", "poisson")
         )
         builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
         builder.add_soft_mesh(
@@ -66,7 +64,10 @@ class _Vbd:
         self._model.soft_contact_ke, self._model.soft_contact_kd = contact, 0.0
         self._model.soft_contact_mu = 0.0
         self._solver = newton.solvers.SolverVBD(
-            self._model, iterations=iterations, integrate_with_external_rigid_solver=True
+            self._model,
+            iterations=iterations,
+            integrate_with_external_rigid_solver=True,
+            particle_enable_tile_solve=False,  # tiles are for graphics cards
         )
         self._pipeline = newton.CollisionPipeline(self._model, soft_contact_margin=2.0 * skin + 1e-3)
         self._contacts, self._control = self._pipeline.contacts(), self._model.control()
@@ -95,6 +96,10 @@ class _Vbd:
 def load(case: Any, **setting: Any) -> SteppedBall:
     """Return the method; `setting` is one of `SETTINGS`."""
     used = {"skin": 1e-3, "damping": 0.0, **(setting or BEST)}
-    words = f"step {1e3 * used['step']:g} ms, {used['iterations']} iterations, contact {used['contact']:g} N/m"
-    words += f", skin {1e3 * used['skin']:g} mm" + f", damping {used['damping']:g} Pa s" * (used["damping"] != 0.0)
+    words = (
+        f"step {1e3 * used['step']:g} ms, {used['iterations']} iterations, contact {used['contact']:g} N/m"
+    )
+    words += f", skin {1e3 * used['skin']:g} mm" + f", damping {used['damping']:g} Pa s" * (
+        used["damping"] != 0.0
+    )
     return SteppedBall(_Vbd(case, **used), case, words)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
 
-__all__ = ["Simulator", "SteppedBall", "outward"]
+__all__ = ["NEAR", "Simulator", "SteppedBall", "free_triangles", "outward"]
 
-NEAR = 0.3  # of the ball's radius: places that follow each other so closely are gone to, others are come to anew
-WAY_STEPS = 20  # steps of a way, in which the ball moves evenly
-STEADY = 2e-3  # relative change of the force over the last steps below which the ball is at rest
-LOOK = 10  # steps over which this change is taken
-REST_STEPS = 200  # steps after which a force that still changes counts as it is
+NEAR = (
+    0.3  # of the ball's radius: places that follow each other so closely are gone to, others are come to anew
+)
+WAY_STEPS = 8  # steps of a way, in which the ball moves evenly
+STEADY = 5e-3  # relative change of the force over the last steps below which the ball is at rest
+LOOK = 6  # steps over which this change is taken
+REST_STEPS = 80  # steps after which a force that still changes counts as it is
 
 
 class Simulator(Protocol):
@@ -85,14 +88,18 @@ class SteppedBall:
         return self._last
 
 
-def outward(mesh: dict[str, np.ndarray]) -> Any:
-    """Return a function of a place (3,): the outward normal (3,) of the surface's nearest free triangle."""
-    corners, points = mesh["tetrahedra"], mesh["points"]
+def free_triangles(mesh: dict[str, np.ndarray]) -> np.ndarray:
+    """Return the triangles (n, 3) of the mesh's surface, wound outwards, less those that are held at all corners."""
+    corners = mesh["tetrahedra"]
     faces = np.concatenate([corners[:, order] for order in ([1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1])])
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     faces = faces[first[count == 1]]
-    faces = faces[~mesh["fixed"][faces].all(axis=1)]
-    a, b, c = points[faces].transpose(1, 0, 2)
+    return np.asarray(faces[~mesh["fixed"][faces].all(axis=1)])
+
+
+def outward(mesh: dict[str, np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+    """Return a function of a place (3,): the outward normal (3,) of the surface's nearest free triangle."""
+    a, b, c = mesh["points"][free_triangles(mesh)].transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     middles = (a + b + c) / 3.0

@@ -58,8 +58,8 @@ def write_case(folder, slope=SLOPE):
     head = "press fx fy fz kn energy force_error stiffness_error energy_error"
     known = zip(forces, kn, energy(places, slope), strict=True)
     write_rows(folder / "oracle.csv", head, [(i, *f, k, e, 0, 0, 0) for i, (f, k, e) in enumerate(known)])
-    rows = [(0, i, *place, 0, 0, 1, 0.003) for i, place in enumerate(loop())]
-    write_rows(folder / "loops.csv", "loop index x y z nx ny nz depth", rows)
+    rows = [(0, i, *place) for i, place in enumerate(loop())]
+    write_rows(folder / "loops.csv", "loop index x y z", rows)
     return folder
 
 

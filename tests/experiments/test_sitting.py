@@ -258,6 +258,6 @@ def test_experts_rate_apart_from_others(tmp_path):
         r.expertise: r.odds for r in result.ratings if r.statement == "stiffness" and r.condition == "body1"
     }
     assert odds["surgeon"][0] > 1.0
-    assert odds["student"][0] < 1.0 < odds["student"][2]
+    assert odds["student"][2] < odds["surgeon"][0]  # the others' ratings are of one distribution
     assert {r.people for r in result.ratings} == {3}
     assert "odds of a higher rating" in str(result)

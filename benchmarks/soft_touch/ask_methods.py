@@ -87,9 +87,7 @@ def _versions(name: str) -> str:
     return ", ".join(f"{package} {metadata.version(package)}" for package in PACKAGES.get(name, ()))
 
 
-def ask(
-    name: str, case: str, kept: dict[str, Any], paths: int, count: int | None, loops: bool
-) -> Iterator[dict[str, Any]]:
+def ask(name: str, case: str, kept: dict[str, Any], options: argparse.Namespace) -> Iterator[dict[str, Any]]:
     """Yield what is kept of a method on a case whenever there is more: the sweep, then the best setting's answers."""
     blind = read_case(case, blind=True)
     kept.setdefault("sweep", [])

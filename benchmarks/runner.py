@@ -46,6 +46,7 @@ BENCHMARKS = (
     "runtime",
     "scale",
     "simulator_forces",
+    "soft_bodies",
     "stability",
     "streams",
     "surrogates",

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from palpate.cli.benchmark_command import benchmark_app
 from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.device_commands import devices_app
@@ -40,6 +41,7 @@ app = typer.Typer(
 )
 
 dataset_app = typer.Typer(cls=CommandGroup, help="Datasets of solves.", no_args_is_help=True)
+app.add_typer(benchmark_app, name="benchmark")
 app.add_typer(dataset_app, name="dataset")
 app.add_typer(devices_app, name="devices")
 app.add_typer(material_app, name="material")

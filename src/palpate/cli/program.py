@@ -30,6 +30,7 @@ _WHOLE = "Files that are written are whole; the file being written is left out."
 
 KEPT = {
     "ask": _AS_BEFORE,
+    "benchmark": _WHOLE,
     "card": _WHOLE,
     "correct": "The model is as it was, and no corrected one is written; what a sensor sent is not kept.",
     "dataset export": _WHOLE,

@@ -1,0 +1,137 @@
+"""Ask the methods of soft-touch, each in a sweep of its settings, and keep what they answer.
+
+    python -m benchmarks.soft_touch.ask_methods [--method NAME ...] [--case NAME ...] [--paths 12] [--minutes 30]
+
+A sweep asks for the presses of the first two paths alone. The setting that comes nearest to the oracle there, chosen
+for each body by itself, is asked for everything else: rivals are shown at their best, which this choice flatters.
+What they answer is kept in `answers/METHOD.json` with settings, versions and the machine, case by case, so that a
+second call goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import math
+import sys
+import time
+from collections.abc import Iterator
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from benchmarks.machine import machine_line
+from benchmarks.soft_touch.case_files import CASES, Case, case_names, read_case
+from benchmarks.soft_touch.judge import compare, question
+from benchmarks.soft_touch.standings import ANSWERS, METHODS
+
+__all__ = ["ask", "best_setting", "sweep"]
+
+SWEPT_PATHS = 2
+PACKAGES = {"mujoco_flex": ("mujoco",), "newton_vbd": ("newton", "warp-lang"), "force_rbf": ("scipy",)}
+FIGURES = 6  # significant, of numbers that are kept
+
+
+def sweep(name: str, case: Case, kept: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Yield what each setting of a method answers at the presses of the first paths, less those that are kept."""
+    few = _first_paths(case, SWEPT_PATHS)
+    for setting in settings_of(name, case):
+        if all(row["setting"] != setting for row in kept):
+            begin = time.process_time()
+            method = load(name, case, setting)
+            forces = method.force(few.places).tolist()
+            spent = time.process_time() - begin
+            answers = {"press": few.presses, "at_presses": forces, "seconds": spent}
+            yield {"setting": setting, "settings": method.settings, **answers}
+
+
+def best_setting(case: Case, kept: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the setting whose median force error is least."""
+    return dict(min(kept, key=lambda row: compare(row, case)["jnd_median"] or math.inf)["setting"])
+
+
+def settings_of(name: str, case: Case) -> list[dict[str, Any]]:
+    """Return all settings of a method on a case."""
+    module = _module(name)
+    return list(module.settings_of(case) if hasattr(module, "settings_of") else module.SETTINGS)
+
+
+def load(name: str, case: Case, setting: dict[str, Any]) -> Any:
+    """Return a method in one of its settings."""
+    return _module(name).load(case, **setting)
+
+
+def _module(name: str) -> Any:
+    return importlib.import_module(f"benchmarks.soft_touch.methods.{name}")
+
+
+def _first_paths(case: Case, count: int) -> Case:
+    return case.only([press for press, path in zip(case.presses, case.paths, strict=True) if path < count])
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_rounded(entry) for entry in value]
+    if isinstance(value, float):
+        return float(f"{value:.{FIGURES}g}") if np.isfinite(value) else None
+    return value
+
+
+def _versions(name: str) -> str:
+    return ", ".join(f"{package} {metadata.version(package)}" for package in PACKAGES.get(name, ()))
+
+
+def ask(name: str, case: str, kept: dict[str, Any], paths: int) -> Iterator[dict[str, Any]]:
+    """Yield what is kept of a method on a case whenever there is more: the sweep, then the best setting's answers."""
+    blind = read_case(case, blind=True)
+    kept.setdefault("sweep", [])
+    for row in sweep(name, blind, kept["sweep"]):
+        kept["sweep"].append(row)
+        print(f"{name}, {case}: {row['settings']}, {row['seconds']:.0f} s", file=sys.stderr, flush=True)
+        yield kept
+    if case not in case_names() or not kept["sweep"]:
+        return
+    whole = read_case(case)
+    setting, asked = best_setting(whole, kept["sweep"]), _first_paths(whole, paths)
+    before = kept.get("best", {})
+    if before.get("setting") != setting or before["press"] != asked.presses:
+        answers = question(load(name, whole, setting), asked)
+        kept["best"] = {"setting": setting, **answers}
+        yield kept
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Ask methods for what their files don't hold yet, as long as the time allows."""
+    names = sorted(path.parent.name for path in CASES.glob("*/presses.csv"))
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.soft_touch.ask_methods")
+    parser.add_argument("--method", nargs="+", choices=list(METHODS), default=list(METHODS))
+    parser.add_argument("--case", nargs="+", choices=names, default=names)
+    parser.add_argument("--paths", type=int, default=12, help="paths that the best setting is asked for")
+    parser.add_argument("--minutes", type=float, default=30.0, help="nothing is begun after so long")
+    options = parser.parse_args(arguments)
+    begin = time.monotonic()
+    for name in options.method:
+        path = ANSWERS / f"{name}.json"
+        kept = json.loads(path.read_text("utf-8")) if path.exists() else {"cases": {}}
+        for case in options.case:
+            try:
+                for answers in ask(name, case, dict(kept["cases"].get(case, {})), options.paths):
+                    kept["cases"][case] = _rounded(answers)
+                    kept |= {"versions": _versions(name), "machine": machine_line()}
+                    path.parent.mkdir(exist_ok=True)
+                    text = json.dumps(kept, separators=(",", ":"), ensure_ascii=False)
+                    path.write_text(text.replace('{"setting"', '\n{"setting"') + "\n", "utf-8")
+                    if time.monotonic() - begin > 60.0 * options.minutes:
+                        return 0
+            except ImportError as error:
+                print(f"{METHODS[name]} is left as it is: {error}", file=sys.stderr)
+                break
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

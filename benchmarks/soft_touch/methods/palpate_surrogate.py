@@ -1,0 +1,35 @@
+"""palpate's surrogate of the body, learnt from so many solves (`python -m benchmarks.soft_touch.learn_bodies`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+__all__ = ["LEARNT", "load", "settings_of"]
+
+LEARNT = Path(__file__).parents[1] / "learnt"
+
+
+class _Learnt:
+    def __init__(self, path: Path, solves: int) -> None:
+        import palpate as pp
+
+        self._surrogate, self.solves = pp.Surrogate.load(path), solves
+        self.settings = f"{solves} solves"
+
+    def force(self, places: np.ndarray) -> np.ndarray:
+        return np.asarray(self._surrogate.energy.force(places))
+
+
+def settings_of(case: Any) -> list[dict[str, Any]]:
+    """Return the numbers of solves that the body was learnt from, fewest first."""
+    counts = sorted(int(path.stem.rpartition("-")[2]) for path in LEARNT.glob(f"{case.name}-*.palpate"))
+    return [{"solves": count} for count in counts]
+
+
+def load(case: Any, solves: int | None = None) -> _Learnt:
+    """Return the surrogate learnt from so many solves, by default from the most."""
+    count = settings_of(case)[-1]["solves"] if solves is None else solves
+    return _Learnt(LEARNT / f"{case.name}-{count}.palpate", count)

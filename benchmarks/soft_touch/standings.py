@@ -1,0 +1,133 @@
+"""The standings of soft-touch: figures of all methods whose answers are kept, beside each other.
+
+Answers lie in `answers/METHOD.json` (`ask_methods.py`); they are compared with the oracle's tables anew each time.
+NumPy is enough; the picture needs Matplotlib.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+if __package__:
+    from .case_files import CASES, case_names, read_case
+    from .judge import FIGURES, compare, figure_text
+else:  # beside judge.py as a file
+    from case_files import CASES, case_names, read_case
+    from judge import FIGURES, compare, figure_text
+
+__all__ = ["ANSWERS", "METHODS", "draw", "standings", "standings_text", "sweep_rows"]
+
+ANSWERS = Path(__file__).parent / "answers"
+METHODS = {
+    "palpate_surrogate": "palpate's surrogate",
+    "force_rbf": "RBF on forces (SciPy)",
+    "mujoco_flex": "MuJoCo flex",
+    "newton_vbd": "Newton VBD",
+    "mass_spring": "springs and points",
+}
+"""Files of `methods` and their names in tables."""
+
+
+def standings(
+    cases: list[str], further: dict[str, dict[str, dict[str, Any]]] | None = None
+) -> list[dict[str, Any]]:
+    """Return a row for each case and method, the nearest first: case, method, settings, and the judge's figures.
+
+    `further` maps names of other methods to their figures by case.
+    """
+    rows = []
+    for name in cases:
+        case = read_case(name, CASES)
+        found = []
+        for method, title in METHODS.items():
+            kept = _kept(method)["cases"].get(name)
+            if kept is not None and "best" in kept:
+                figures = compare(kept["best"], case)
+                found.append({"case": name, "method": title, "settings": kept["best"]["settings"], **figures})
+        for title, figures in (further or {}).items():
+            if name in figures:
+                found.append({"case": name, "method": title, "settings": "", **figures[name]})
+        rows += sorted(found, key=lambda row: row["jnd_median"])
+    return rows
+
+
+def standings_text(rows: list[dict[str, Any]]) -> str:
+    """Return rows as a table of text, a block for each case."""
+    heads = ["", *FIGURES.values()]
+    lines = [[row["method"], *(figure_text(row[key]) for key in FIGURES)] for row in rows]
+    widths = [max(map(len, column)) for column in zip(heads, *lines, strict=True)]
+
+    def line(cells: list[str]) -> str:
+        pairs = list(zip(cells, widths, strict=True))
+        return "  ".join([pairs[0][0].ljust(pairs[0][1]), *(cell.rjust(width) for cell, width in pairs[1:])])
+
+    text, case = [], None
+    for row, cells in zip(rows, lines, strict=True):
+        if row["case"] != case:
+            case = row["case"]
+            text += ["", case, line(heads)]
+        text.append(line(cells))
+    return "\n".join(text[1:])
+
+
+def sweep_rows() -> list[dict[str, Any]]:
+    """Return a row for each setting of each method on each case that has an oracle, in the order of the sweep."""
+    rows = []
+    for method, title in METHODS.items():
+        for name, kept in _kept(method)["cases"].items():
+            if name in case_names():
+                case = read_case(name, CASES)
+                for row in kept["sweep"]:
+                    words = {
+                        "method": title,
+                        "case": name,
+                        "settings": row["settings"],
+                        "seconds": row["seconds"],
+                    }
+                    rows.append(compare(row, case) | words)
+    return rows
+
+
+def sources() -> dict[str, str]:
+    """Return by the methods' titles the versions and the machine that their answers come from."""
+    kept = {title: _kept(method) for method, title in METHODS.items()}
+    return {
+        title: "; ".join(filter(None, (k["versions"], k["machine"])))
+        for title, k in kept.items()
+        if k["cases"]
+    }
+
+
+def _kept(method: str) -> dict[str, Any]:
+    path = ANSWERS / f"{method}.json"
+    empty: dict[str, Any] = {"cases": {}, "versions": "", "machine": ""}
+    return json.loads(path.read_text("utf-8")) if path.exists() else empty
+
+
+def draw(rows: list[dict[str, Any]], path: Path) -> None:
+    """Draw the force error in just noticeable differences over the seconds of a step, a panel for each case."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    cases = list(dict.fromkeys(row["case"] for row in rows))
+    titles = list(dict.fromkeys(row["method"] for row in rows))
+    with rc_context({"svg.hashsalt": "soft-touch", "font.size": 9}):
+        figure = Figure(figsize=(2.6 * len(cases) + 1.2, 3.2), layout="constrained")
+        panels = figure.subplots(1, len(cases), sharex=True, sharey=True, squeeze=False)[0]
+        for panel, case in zip(panels, cases, strict=True):
+            for row in rows:
+                if row["case"] == case and row["seconds_step"]:
+                    k = titles.index(row["method"])
+                    ends = [row["jnd_median"], min(row["jnd_p95"], 1e3)]
+                    at = [1e3 * row["seconds_step"]] * 2
+                    panel.plot(at, ends, color=f"C{k}", linewidth=1.5)
+                    panel.plot(at[:1], ends[:1], "osD^vP*X"[k % 8], color=f"C{k}", label=row["method"])
+            panel.axhline(1.0, color="0.4", linewidth=0.8, linestyle="--")
+            panel.axvline(1.0, color="0.4", linewidth=0.8, linestyle=":")
+            panel.set(xscale="log", yscale="log", title=case, xlabel="ms a step")
+        panels[0].set_ylabel("force error, JND: median to 95th percentile")
+        handles = {label: h for p in panels for h, label in zip(*p.get_legend_handles_labels(), strict=True)}
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles))
+        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)

@@ -1,0 +1,135 @@
+"""`palpate benchmark soft-touch`: how near simulated soft bodies come to the force that a hand would feel."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+import tempfile
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from palpate.cli.command_names import CommandGroup
+from palpate.cli.console import Console
+from palpate.cli.number_options import count_option
+from palpate.errors import UsageError
+
+__all__ = ["benchmark_app", "soft_touch"]
+
+benchmark_app = typer.Typer(
+    cls=CommandGroup, help="Open benchmarks, and your own method in them.", no_args_is_help=True
+)
+_PACKAGE = "palpate_soft_touch"  # name under which the folder is imported, in a clone and in a wheel
+
+
+@benchmark_app.callback()
+def _benchmarks() -> None:
+    """Keep the name of the benchmark in the command while there is a single one."""
+
+
+@benchmark_app.command("soft-touch")
+def soft_touch(
+    case: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Body: block, layered, dome, organ or lump. Several times for several. Default: all."
+        ),
+    ] = None,
+    judge: Annotated[
+        Path | None,
+        typer.Option(help="Your method: a Python file with load(case), an FMU, or a CSV table of forces."),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        count_option(
+            "--seed", least=0, help="Solve other places, of this seed, and judge there. Takes minutes a body."
+        ),
+    ] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures to this file.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the standings: a .svg or .png file.")] = None,
+) -> None:
+    """Compare soft bodies of simulators and surrogates by the force on a hand, and your own method with them."""
+    from palpate.output_files import require_outputs
+
+    require_outputs([path for path in (json_file, plot) if path is not None], overwrite=True)
+    folder = _folder()
+    judging, standing = _module(folder, "judge"), _module(folder, "standings")
+    try:
+        rows = _rows(judging, standing, _cases(judging, case), judge, seed)
+    except judging.JudgeError as error:
+        raise UsageError(error.what, why=error.why, fix=error.fix) from error
+    Console().say(standing.standings_text(rows))
+    if json_file is not None:
+        content = {"rows": rows, "sweep": standing.sweep_rows(), "sources": standing.sources()}
+        json_file.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", "utf-8")
+    if plot is not None:
+        standing.draw(rows, plot)
+
+
+def _folder() -> Path:
+    """Return the benchmark's folder: of the installed package, or of the clone that this file stands in."""
+    here = Path(__file__)
+    places = here.parents[1] / "soft_touch", here.parents[3] / "benchmarks" / "soft_touch"
+    for place in places:
+        if (place / "judge.py").is_file():
+            return place
+    raise UsageError(
+        "The benchmark's folder is missing.", fix="Install palpate anew, or run it from a clone."
+    )
+
+
+def _module(folder: Path, name: str) -> Any:
+    if _PACKAGE not in sys.modules:
+        spec = spec_from_file_location(
+            _PACKAGE, folder / "__init__.py", submodule_search_locations=[str(folder)]
+        )
+        assert spec is not None
+        assert spec.loader is not None
+        package = module_from_spec(spec)
+        sys.modules[_PACKAGE] = package
+        spec.loader.exec_module(package)
+    return importlib.import_module(f"{_PACKAGE}.{name}")
+
+
+def _cases(judging: Any, wanted: list[str] | None) -> list[str]:
+    names = judging.case_names()
+    if not names:
+        raise UsageError("No case has an oracle yet.", fix="Run python -m benchmarks.soft_touch.make_cases.")
+    unknown = [name for name in wanted or () if name not in names]
+    if unknown:
+        raise UsageError(f"There is no case {unknown[0]!r}.", fix=f"Cases are {', '.join(names)}.")
+    return wanted or names
+
+
+def _rows(
+    judging: Any, standing: Any, cases: list[str], file: Path | None, seed: int | None
+) -> list[dict[str, Any]]:
+    """Return the standings; at places of a seed those of the methods that can be asked anew."""
+    if seed is None:
+        own = _judged(judging, file, {name: judging.read_case(name) for name in cases}) if file else {}
+        return list(standing.standings(cases, own))
+    with tempfile.TemporaryDirectory() as scratch:
+        make_places = _module(_folder(), "make_cases").make_places
+        for name in cases:
+            make_places(name, seed, Path(scratch) / name)
+        read = {name: judging.read_case(name, Path(scratch)) for name in cases}
+        learnt = _folder() / "methods" / "palpate_surrogate.py"
+        figures = {"palpate's surrogate": _judged(judging, learnt, read)["palpate_surrogate.py"]}
+        figures |= _judged(judging, file, read) if file else {}
+    return [
+        {"case": name, "method": title, "settings": f"places of seed {seed}", **of_cases[name]}
+        for name in cases
+        for title, of_cases in figures.items()
+    ]
+
+
+def _judged(judging: Any, file: Path, cases: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the figures of a method's file by its name and the cases."""
+    return {
+        file.name: {
+            name: judging.judge(judging.read_method(file, case), case) for name, case in cases.items()
+        }
+    }

@@ -164,19 +164,34 @@ def write_oracle(folder: File, *, reference: File | None = None) -> None:
         return
     part, doubt = _mesh_part(shipped)
     gaps = _solver_gaps(shipped, paths_of(folder.name, SEED))
+    presses = np.loadtxt(folder / "presses.csv", delimiter=",", skiprows=1)
     with (folder / "oracle.csv").open("w", encoding="utf-8") as stream:
         stream.write("press,fx,fy,fz,kn,energy,force_error,stiffness_error,energy_error\n")
-        for press in sorted(coarse):
-            step = press % STEPS
-            if press in finer:
-                value = _extrapolate(coarse[press], finer[press])
-                error = _sizes(np.abs(value - finer[press]))
-            else:
-                value = coarse[press] * (1 + part[step, [0, 0, 0, 1, 2]])
-                error = doubt[step] * _sizes(value)
-            error = np.maximum(error, gaps[step] * _sizes(value))
-            words = [f"{number:.6g}" for number in value] + [f"{number:.2g}" for number in error]
-            stream.write(",".join([str(press), *words]) + "\n")
+        for first in sorted({press - press % STEPS for press in coarse}):
+            values, errors = np.empty((STEPS, 5)), np.empty((STEPS, 3))
+            for step, press in enumerate(range(first, first + STEPS)):
+                if press in finer:
+                    values[step] = _extrapolate(coarse[press], finer[press])
+                    errors[step] = _sizes(np.abs(values[step] - finer[press]))
+                else:
+                    values[step] = coarse[press] * (1 + part[step, [0, 0, 0, 1, 2]])
+                    errors[step] = doubt[step] * _sizes(values[step])
+                errors[step] = np.maximum(errors[step], gaps[step] * _sizes(values[step]))
+            own = presses[first : first + STEPS]
+            errors[:, 1] = np.maximum(errors[:, 1], _ripple(own[:, 9], own[0, 6:9], values))
+            for step in range(STEPS):
+                words = [f"{x:.6g}" for x in values[step]] + [f"{x:.2g}" for x in errors[step]]
+                stream.write(",".join([str(first + step), *words]) + "\n")
+
+
+def _ripple(depth: np.ndarray, normal: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the error of the stiffness (5,) in N/m that its mean shows beside the force's own slope between depths.
+
+    Elements enter the contact one after the other, of which the stiffness tells more than the force.
+    """
+    slope = np.diff(values[:, :3] @ normal) / np.diff(depth)
+    gap = np.abs(slope - (values[1:, 3] + values[:-1, 3]) / 2)
+    return np.maximum(np.append(gap, 0.0), np.append(0.0, gap))
 
 
 def _by_press(

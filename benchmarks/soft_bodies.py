@@ -12,8 +12,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from benchmarks.runner import main
-from benchmarks.soft_touch.judge import FIGURES, case_names, figure_text
+from benchmarks.soft_touch.judge import FIGURES, case_names, figure_text, noticeable, read_case
 from benchmarks.soft_touch.standings import draw, sources, standings, sweep_rows
 from benchmarks.table import Column, Table, quick_mark
 
@@ -30,6 +32,7 @@ def tables(*, quick: bool) -> list[Table]:
     notes = (
         "JND: error over what a hand just notices, 7 % of the force, below 1 N 10 %",
         "a rival's setting is the one that comes nearest on two of the paths, for each body by itself",
+        *(_oracle_note(name) for name in case_names()),
         *(f"{title}: {source}" for title, source in sources().items()),
     )
     columns = (
@@ -53,6 +56,12 @@ def tables(*, quick: bool) -> list[Table]:
         ),
         Table("soft_touch_sweep", f"Settings of each method{quick_mark(quick)}", swept, _texts(sweep_rows())),
     ]
+
+
+def _oracle_note(name: str) -> str:
+    case = read_case(name)
+    own = float(np.median(case.force_error / noticeable(case.force)))
+    return f"oracle of {name}: {len(case.presses)} presses, whose own error is {own:.2g} JND at the median"
 
 
 def _texts(rows: list[dict[str, Any]]) -> list[dict[str, str]]:

@@ -34,10 +34,12 @@ PACKAGES = {"mujoco_flex": ("mujoco",), "newton_vbd": ("newton", "warp-lang"), "
 FIGURES = 6  # significant, of numbers that are kept
 
 
-def sweep(name: str, case: Case, kept: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+def sweep(
+    name: str, case: Case, kept: list[dict[str, Any]], count: int | None = None
+) -> Iterator[dict[str, Any]]:
     """Yield what each setting of a method answers at the presses of the first paths, less those that are kept."""
     few = _first_paths(case, SWEPT_PATHS)
-    for setting in settings_of(name, case):
+    for setting in settings_of(name, case)[:count]:
         if all(row["setting"] != setting for row in kept):
             begin = time.process_time()
             method = load(name, case, setting)
@@ -85,21 +87,21 @@ def _versions(name: str) -> str:
     return ", ".join(f"{package} {metadata.version(package)}" for package in PACKAGES.get(name, ()))
 
 
-def ask(name: str, case: str, kept: dict[str, Any], paths: int) -> Iterator[dict[str, Any]]:
+def ask(name: str, case: str, kept: dict[str, Any], options: argparse.Namespace) -> Iterator[dict[str, Any]]:
     """Yield what is kept of a method on a case whenever there is more: the sweep, then the best setting's answers."""
     blind = read_case(case, blind=True)
     kept.setdefault("sweep", [])
-    for row in sweep(name, blind, kept["sweep"]):
+    for row in sweep(name, blind, kept["sweep"], options.settings):
         kept["sweep"].append(row)
         print(f"{name}, {case}: {row['settings']}, {row['seconds']:.0f} s", file=sys.stderr, flush=True)
         yield kept
     if case not in case_names() or not kept["sweep"]:
         return
     whole = read_case(case)
-    setting, asked = best_setting(whole, kept["sweep"]), _first_paths(whole, paths)
+    setting, asked = best_setting(whole, kept["sweep"]), _first_paths(whole, options.paths)
     before = kept.get("best", {})
     if before.get("setting") != setting or before["press"] != asked.presses:
-        answers = question(load(name, whole, setting), asked)
+        answers = question(load(name, whole, setting), asked, loops=options.loops)
         kept["best"] = {"setting": setting, **answers}
         yield kept
 
@@ -112,14 +114,19 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--case", nargs="+", choices=names, default=names)
     parser.add_argument("--paths", type=int, default=12, help="paths that the best setting is asked for")
     parser.add_argument("--minutes", type=float, default=30.0, help="nothing is begun after so long")
+    parser.add_argument("--settings", type=int, help="settings of the sweep, the first ones. Default: all")
+    parser.add_argument(
+        "--no-loops", dest="loops", action="store_false", help="leave out closed paths and strokes"
+    )
     options = parser.parse_args(arguments)
     begin = time.monotonic()
     for name in options.method:
         path = ANSWERS / f"{name}.json"
         kept = json.loads(path.read_text("utf-8")) if path.exists() else {"cases": {}}
         for case in options.case:
+            before = dict(kept["cases"].get(case, {}))
             try:
-                for answers in ask(name, case, dict(kept["cases"].get(case, {})), options.paths):
+                for answers in ask(name, case, before, options):
                     kept["cases"][case] = _rounded(answers)
                     kept |= {"versions": _versions(name), "machine": machine_line()}
                     path.parent.mkdir(exist_ok=True)

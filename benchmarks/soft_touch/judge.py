@@ -186,8 +186,9 @@ def question(method: Any, case: Case, *, loops: bool = True) -> dict[str, Any]:
         %, `lateness` in ms, `seconds_step`, `solves`, `settings`; None where the method can't say.
     """
     ask = _asker(method)
-    own = {name: getattr(method, name, None) for name in ("seconds_step", "solves", "settings")}
+    own = {name: getattr(method, name, None) for name in ("solves", "settings")}
     if ask is None:
+        own["seconds_step"] = getattr(method, "seconds_step", None)
         return {**own, "press": case.presses, "at_presses": method.at_presses.tolist()}
     answers = {
         **own,
@@ -196,10 +197,13 @@ def question(method: Any, case: Case, *, loops: bool = True) -> dict[str, Any]:
         "deeper": ask(case.shift(PROBE_STEP)).tolist(),
         "shallower": ask(case.shift(-PROBE_STEP)).tolist(),
     }
+    answers["seconds_step"] = getattr(
+        method, "seconds_step", None
+    )  # after asking: a method may count its steps
     if loops:
         answers["loop_work"] = _largest([_loop_work(ask, case, loop) for loop in case.loops])
         answers["lateness"], seconds = _stroke_figures(method, ask, case)
-        answers["seconds_step"] = seconds if own["seconds_step"] is None else own["seconds_step"]
+        answers["seconds_step"] = answers["seconds_step"] or seconds
     return answers
 
 
@@ -238,10 +242,9 @@ def _asker(method: Any) -> Callable[[np.ndarray], np.ndarray] | None:
 
 
 def _force_figures(forces: np.ndarray, case: Case) -> dict[str, float | None]:
-    size = np.linalg.norm(case.force, axis=1)
     error = np.linalg.norm(forces - case.force, axis=1)
     error[~np.isfinite(error)] = np.inf
-    jnd = error / np.where(size < SMALL, WEBER_SMALL * size, WEBER * size)
+    jnd = error / noticeable(case.force)
     cross = np.linalg.norm(np.cross(forces, case.force), axis=1)
     angle = np.degrees(np.arctan2(cross, np.einsum("ij,ij->i", forces, case.force)))
     pushed = np.isfinite(angle) & (np.linalg.norm(forces, axis=1) > 0.0)
@@ -253,6 +256,12 @@ def _force_figures(forces: np.ndarray, case: Case) -> dict[str, float | None]:
         "direction_median": _quantile(angle[pushed], 0.5),
         "presses": float(np.isfinite(error).sum()),
     }
+
+
+def noticeable(forces: np.ndarray) -> np.ndarray:
+    """Return the just noticeable difference (n,) of each force (n, 3), N."""
+    size = np.linalg.norm(forces, axis=1)
+    return np.asarray(np.where(size < SMALL, WEBER_SMALL * size, WEBER * size))
 
 
 def _quantile(values: np.ndarray, share: float) -> float | None:

@@ -10,24 +10,24 @@ other places of the same bodies are solved by palpate alone.
 from __future__ import annotations
 
 import argparse
-import csv
 import shutil
 import sys
 import time
+from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path as File
-from typing import Any
 
 import numpy as np
 
-from benchmarks.soft_touch.bodies import BODIES, RADIUS, SEED, loops_of, paths_of
 from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.meshing import FineMesh
 
+from .bodies import BODIES, CASES, RADIUS, SEED
+from .places import write_places
+
 __all__ = ["CASES", "make_places", "write_case"]
 
-CASES = File(__file__).parent / "cases"
 LAW = "W = shear/2 (J^(-2/3) tr(FᵀF) - 3) + bulk/2 (J - 1)^2, J = det F"
 
 
@@ -41,40 +41,16 @@ def write_case(name: str, folder: File) -> None:
     _write_mesh(mesh, folder / "mesh.vtu", soft.body.fixed)
 
 
-def write_places(name: str, seed: int, folder: File) -> None:
-    """Write the presses and loops of a seed."""
-    presses: list[list[Any]] = []
-    for path in paths_of(name, seed):
-        for step, (centre, depth) in enumerate(zip(path.centres, path.depths, strict=True)):
-            row = [f"{value:.9f}" for value in (*centre, *path.normal, depth)]
-            presses.append([len(presses), path.number, step, *row])
-    write_table(folder / "presses.csv", "press,path,step,x,y,z,nx,ny,nz,depth", presses)
-    loops = [
-        [loop, index, *(f"{value:.9f}" for value in point)]
-        for loop, points in enumerate(loops_of(name, seed))
-        for index, point in enumerate(points)
-    ]
-    write_table(folder / "loops.csv", "loop,index,x,y,z", loops)
-
-
 def make_places(name: str, seed: int, folder: File) -> None:
     """Write a whole case with the places of another seed, solved by palpate alone, in some minutes."""
-    from benchmarks.soft_touch.oracle import solve_paths, write_oracle
+    from .oracle import solve_paths, write_oracle
 
     folder.mkdir(parents=True, exist_ok=True)
     for part in ("case.toml", "mesh.vtu"):
         shutil.copy(CASES / name / part, folder / part)
     write_places(name, seed, folder)
-    solve_paths(name, seed, folder, until=np.inf)
+    deque(solve_paths(name, seed, folder), maxlen=0)
     write_oracle(folder, reference=CASES / name)
-
-
-def write_table(file: File, header: str, rows: Iterable[Sequence[Any]]) -> None:
-    """Write a table with commas."""
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(header.split(","))
-        writer.writerows(rows)
 
 
 def _card(name: str, mesh: BodyMesh) -> str:
@@ -140,7 +116,7 @@ def _write_mesh(mesh: BodyMesh, file: File, fixed: Iterable[str]) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write folders, solve, and join."""
-    from benchmarks.soft_touch.oracle import solve_calculix, solve_paths, write_oracle
+    from .oracle import solve_calculix, solve_paths, write_oracle
 
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.soft_touch.make_cases", description=__doc__.split("\n")[0]
@@ -155,16 +131,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if (options.seed is None) != (options.out is None):
         parser.error("--seed and --out belong together: the shipped folders keep the published seed")
     until = time.monotonic() + 60 * options.minutes
-    for name in options.case:
-        folder = CASES / name
-        if options.seed is not None:
+    if options.seed is not None:
+        for name in options.case:
             make_places(name, options.seed, options.out / name)
-        elif options.shapes:
-            write_case(name, folder)
-            write_places(name, SEED, folder)
-        else:
-            (solve_calculix if options.calculix else solve_paths)(name, SEED, folder, until=until)
-            write_oracle(folder)
+    elif options.shapes:
+        for name in options.case:
+            write_case(name, CASES / name)
+            write_places(name, SEED, CASES / name)
+    else:
+        solve = solve_calculix if options.calculix else solve_paths
+        work = {name: solve(name, SEED, CASES / name) for name in options.case}
+        while work and time.monotonic() < until:  # by turns, so that every body has some rows soon
+            for name in list(work):
+                if next(work[name], False) is False:
+                    del work[name]
+                write_oracle(CASES / name)
     return 0
 
 

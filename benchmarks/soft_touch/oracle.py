@@ -14,22 +14,37 @@ from __future__ import annotations
 import csv
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path as File
 from typing import Any
 
 import numpy as np
 
-from benchmarks.soft_touch.bodies import BODIES, DEPTHS, RADIUS, STEPS, Path, paths_of
 from palpate.physics.interactions import SphereProbe
 from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.solid import SolidProblem
+
+from .bodies import BODIES, CASES, DEPTHS, RADIUS, SEED, STEPS, Path, paths_of
 
 __all__ = ["fine_problem", "read_solves", "solve_calculix", "solve_paths", "write_oracle"]
 
 ELEMENT = 0.0025  # m, elements under the ball: 0.8 of the narrowest contact's radius
 FINER = 0.7  # size of the finer elements over that: twice the unknowns
-REACH = 0.0075  # m, half the side of the fine box: the widest contact has a radius of 6.3 mm
-BOTH = (0, 4, 8, 2, 6, 10, 1, 3, 5, 7, 9, 11)  # order in which paths are solved on finer elements
+REACH = 0.0065  # m, half the side of the fine box: the widest contact has a radius of 6.3 mm
+BOTH = (
+    0,
+    4,
+    8,
+    2,
+    6,
+    10,
+    1,
+    3,
+    5,
+    7,
+    9,
+    11,
+)  # order in which paths are solved on finer elements and by CalculiX
 TOLERANCE = 1e-6  # relative error in the energy norm, far below that of the mesh
 NUDGE = 1e-3  # relative change of the pad's stiffness by which the derivative is taken
 HEADER = "press,solver,element,fx,fy,fz,kn,energy,seconds"
@@ -43,7 +58,9 @@ def fine_problem(name: str, path: Path, element: float) -> SolidProblem:
         RADIUS, touches=soft.touches, pad="rigid", stop=None, depth=(0.0, DEPTHS[1]), over=around
     )
     box = (tuple((path.place - REACH).tolist()), tuple((path.place + REACH).tolist()))
-    return SolidProblem(soft.body, (probe,), fine=(FineMesh(soft.touches, element, *box),))
+    geometry: Any = soft.body.geometry
+    body = replace(soft.body, geometry=replace(geometry, element=max(geometry.coarse, soft.coarse)))
+    return SolidProblem(body, (probe,), fine=(FineMesh(soft.touches, element, *box),))
 
 
 def solve_path(name: str, path: Path, element: float, steps: int = STEPS) -> list[list[float]]:
@@ -76,13 +93,14 @@ def _without_pad(model: Any, pressed: Any) -> tuple[np.ndarray, np.ndarray, floa
     return pressed.response[:3], change, 2 * pressed.potential_energy - pressed.strain_energy
 
 
-def solve_paths(name: str, seed: int, folder: File, *, until: float) -> None:
-    """Add palpate's solves that `solves.csv` does not hold yet; none begins after a time."""
+def solve_paths(name: str, seed: int, folder: File) -> Iterator[None]:
+    """Add palpate's solves of a case that `solves.csv` does not hold yet, one path at each step of the iteration."""
     paths = paths_of(name, seed)
-    plan = [(path, ELEMENT) for path in paths] + [(paths[k], FINER * ELEMENT) for k in BOTH]
+    plan = [(path, ELEMENT) for path in paths]
+    if seed == SEED:  # a table of other places takes the mesh's part from the shipped one
+        finer = [(paths[k], FINER * ELEMENT) for k in BOTH]
+        plan = [plan[0], finer[0], *plan[1:], *finer[1:]] if name == "block" else plan + finer
     for path, element in plan:
-        if time.monotonic() > until:
-            return
         first = path.number * STEPS
         if (first, "palpate", f"{element:g}") in read_solves(folder):
             continue
@@ -91,28 +109,27 @@ def solve_paths(name: str, seed: int, folder: File, *, until: float) -> None:
         spent = (time.process_time() - began) / len(rows)
         _append(folder, [[first + k, "palpate", f"{element:g}", *row, spent] for k, row in enumerate(rows)])
         print(f"{name}, path {path.number}, {element:g} m: {spent:.1f} s of CPU time a press", flush=True)
+        yield
 
 
-def solve_calculix(name: str, seed: int, folder: File, *, until: float) -> None:
-    """Add CalculiX's solves that `solves.csv` does not hold yet; none begins after a time."""
-    from benchmarks.soft_touch.calculix_press import solve_path as solve
+def solve_calculix(name: str, seed: int, folder: File) -> Iterator[None]:
+    """Add CalculiX's solves of a case that `solves.csv` does not hold yet, one path at each step of the iteration."""
+    from .calculix_press import solve_press_path
 
-    paths = paths_of(name, seed)
-    for path in (paths[k] for k in BOTH):
-        if time.monotonic() > until:
-            return
+    for path in (paths_of(name, seed)[k] for k in BOTH):
         first = path.number * STEPS
-        if any((first, "CalculiX") == key[:2] for key in read_solves(folder)):
+        if (first, "CalculiX", f"{ELEMENT:g}") in read_solves(folder):
             continue
         began = time.monotonic()
-        forces, energies, element = solve(name, path)
+        forces = solve_press_path(fine_problem(name, path, ELEMENT), path)
         spent = (time.monotonic() - began) / len(forces)
         rows = [
-            [first + k, "CalculiX", f"{element:g}", *force, np.nan, energy, spent]
-            for k, (force, energy) in enumerate(zip(forces, energies, strict=True))
+            [first + k, "CalculiX", f"{ELEMENT:g}", *force, np.nan, np.nan, spent]
+            for k, force in enumerate(forces)
         ]
         _append(folder, rows)
         print(f"{name}, path {path.number}, CalculiX: {spent:.1f} s a press", flush=True)
+        yield
 
 
 def read_solves(folder: File) -> dict[tuple[int, str, str], np.ndarray]:
@@ -140,33 +157,98 @@ def _append(folder: File, rows: list[list[Any]]) -> None:
 
 
 def write_oracle(folder: File, *, reference: File | None = None) -> None:
-    """Write `oracle.csv` from `solves.csv`; a folder of another seed takes CalculiX's differences from a reference."""
-    from benchmarks.soft_touch.make_cases import write_table
+    """Write `oracle.csv` from `solves.csv`; a folder of another seed takes both corrections from a reference."""
+    solves, shipped = read_solves(folder), read_solves(folder if reference is None else reference)
+    coarse, finer = _by_press(solves, "palpate", ELEMENT), _by_press(solves, "palpate", FINER * ELEMENT)
+    if not coarse:
+        return
+    part, doubt = _mesh_part(shipped)
+    gaps = _solver_gaps(shipped, paths_of(folder.name, SEED))
+    presses = np.loadtxt(folder / "presses.csv", delimiter=",", skiprows=1)
+    with (folder / "oracle.csv").open("w", encoding="utf-8") as stream:
+        stream.write("press,fx,fy,fz,kn,energy,force_error,stiffness_error,energy_error\n")
+        for first in sorted({press - press % STEPS for press in coarse}):
+            values, errors = np.empty((STEPS, 5)), np.empty((STEPS, 3))
+            for step, press in enumerate(range(first, first + STEPS)):
+                if press in finer:
+                    values[step] = _extrapolate(coarse[press], finer[press])
+                    errors[step] = _sizes(np.abs(values[step] - finer[press]))
+                else:
+                    values[step] = coarse[press] * (1 + part[step, [0, 0, 0, 1, 2]])
+                    errors[step] = doubt[step] * _sizes(values[step])
+                errors[step] = np.maximum(errors[step], gaps[step] * _sizes(values[step]))
+            own = presses[first : first + STEPS]
+            errors[:, 1] = np.maximum(errors[:, 1], _ripple(own[:, 9], own[0, 6:9], values))
+            for step in range(STEPS):
+                words = [f"{x:.6g}" for x in values[step]] + [f"{x:.2g}" for x in errors[step]]
+                stream.write(",".join([str(first + step), *words]) + "\n")
 
-    rows = list(oracle_rows(folder, folder if reference is None else reference))
-    header = "press,fx,fy,fz,kn,energy,force_error,stiffness_error,energy_error"
-    write_table(folder / "oracle.csv", header, rows)
+
+def _ripple(depth: np.ndarray, normal: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the error of the stiffness (5,) in N/m that its mean shows beside the force's own slope between depths.
+
+    Elements enter the contact one after the other, of which the stiffness tells more than the force.
+    """
+    slope = np.diff(values[:, :3] @ normal) / np.diff(depth)
+    gap = np.abs(slope - (values[1:, 3] + values[:-1, 3]) / 2)
+    return np.maximum(np.append(gap, 0.0), np.append(0.0, gap))
 
 
-def oracle_rows(folder: File, reference: File) -> Iterator[list[Any]]:
-    """Yield rows of the oracle: values at h → 0 and errors."""
-    solves = read_solves(folder)
-    normals = _normals(folder)
-    coarse, finer = _of(solves, ELEMENT), _of(solves, FINER * ELEMENT)
-    factor = _mesh_factors(coarse, finer)
-    differences = _solver_differences(reference)
-    for press in sorted(coarse):
-        step, size = press % STEPS, _sizes(coarse[press])
-        if press in finer:
-            value = finer[press] + (finer[press] - coarse[press]) * FINER**2 / (1 - FINER**2)
-            gap = np.abs(_sizes(value - finer[press]))
-        else:
-            value = coarse[press] * (1 + factor[step, 0])
-            gap = size * factor[step, 1]
-        error = np.maximum(gap, size * differences[step])
-        yield [press, *(f"{number:.7g}" for number in value), *(f"{number:.3g}" for number in error)]
-    assert len(normals) >= len(coarse)
+def _by_press(
+    solves: dict[tuple[int, str, str], np.ndarray], solver: str, element: float
+) -> dict[int, np.ndarray]:
+    return {key[0]: row for key, row in solves.items() if key[1:] == (solver, f"{element:g}")}
 
 
-def _normals(folder: File) -> np.ndarray:
-    return np.loadtxt(folder / "presses.csv", delimiter=",", skiprows=1, usecols=(6, 7, 8))
+def _sizes(row: np.ndarray) -> np.ndarray:
+    """Return the force's size, stiffness and energy (3,) of a row."""
+    return np.array([np.linalg.norm(row[:3]), row[3], row[4]])
+
+
+def _extrapolate(coarse: np.ndarray, finer: np.ndarray) -> np.ndarray:
+    """Return a row for elements of size zero, by Richardson's rule for an error of second order."""
+    return np.asarray(finer + (finer - coarse) * FINER**2 / (1 - FINER**2))
+
+
+def _mesh_part(solves: dict[tuple[int, str, str], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return, by step, what force, stiffness and energy on coarse elements miss (5, 3), relative, and its error.
+
+    It goes with the size of elements over the contact's radius. So a body without a path on finer elements has that of
+    the block, all of which counts as an error.
+    """
+    borrowed = not _by_press(solves, "palpate", FINER * ELEMENT)
+    if borrowed:
+        solves = read_solves(CASES / "block")
+    coarse, finer = (_by_press(solves, "palpate", size) for size in (ELEMENT, FINER * ELEMENT))
+    part, doubt = np.zeros((STEPS, 3)), np.zeros((STEPS, 3))
+    for step in range(STEPS):
+        presses = [press for press in finer if press % STEPS == step]
+        ends = [_sizes(_extrapolate(coarse[k], finer[k])) for k in presses]
+        missing = np.array([end / _sizes(coarse[k]) - 1 for k, end in zip(presses, ends, strict=True)])
+        left = np.array([np.abs(end / _sizes(finer[k]) - 1) for k, end in zip(presses, ends, strict=True)])
+        part[step] = missing.mean(axis=0)
+        doubt[step] = (
+            np.abs(missing - part[step]).max(axis=0) + left.max(axis=0) + borrowed * np.abs(part[step])
+        )
+    return part, doubt
+
+
+def _solver_gaps(solves: dict[tuple[int, str, str], np.ndarray], paths: list[Path]) -> np.ndarray:
+    """Return, by step, the largest difference of the two solvers on one mesh (5, 3), relative; 0 without a rival.
+
+    CalculiX gives forces. Their difference along a path, as a parabola in the depth, has a slope and an integral.
+    """
+    own, other = _by_press(solves, "palpate", ELEMENT), _by_press(solves, "CalculiX", ELEMENT)
+    gaps = np.zeros((STEPS, 3))
+    for path in paths:
+        steps = [k for k in range(STEPS) if {path.number * STEPS + k} <= own.keys() & other.keys()]
+        if len(steps) < 2:
+            continue
+        ours, theirs = (np.array([rows[path.number * STEPS + k] for k in steps]) for rows in (own, other))
+        depth, along = path.depths[steps], (theirs - ours)[:, :3] @ path.normal
+        linear, square = np.linalg.lstsq(np.column_stack([depth, depth**2]), along, rcond=None)[0]
+        force = np.linalg.norm((theirs - ours)[:, :3], axis=1) / np.linalg.norm(ours[:, :3], axis=1)
+        slope = np.abs(linear + 2 * square * depth) / ours[:, 3]
+        energy = np.abs(linear * depth**2 / 2 + square * depth**3 / 3) / ours[:, 4]
+        gaps[steps] = np.maximum(gaps[steps], np.column_stack([force, slope, energy]))
+    return gaps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -48,6 +49,12 @@ class SteppedBall:
         self.simulator, self.settings, self._radius = simulator, settings, case.radius
         self._outward = outward(case.mesh)
         self._place: np.ndarray | None = None
+        self._times: list[float] = []
+
+    @property
+    def seconds_step(self) -> float | None:
+        """Time of the processor for a step, s, the median; other work on the machine lengthens it little."""
+        return float(np.median(self._times)) if self._times else None
 
     def force(self, places: np.ndarray) -> np.ndarray:
         """Return the forces (n, 3) at which the body comes to rest, nan where the simulator fails."""
@@ -59,10 +66,10 @@ class SteppedBall:
             self.simulator.reset()
             self._place = place + self._radius * self._outward(place)
         for share in np.linspace(0.0, 1.0, WAY_STEPS + 1)[1:]:
-            self.simulator.advance(self._place + share * (place - self._place))
+            self._advance(self._place + share * (place - self._place))
         forces: list[np.ndarray] = []
         while len(forces) < REST_STEPS:
-            forces.append(self.simulator.advance(place))
+            forces.append(self._advance(place))
             last = np.array(forces[-LOOK:])
             if not np.isfinite(last).all():
                 self._place = None
@@ -73,17 +80,23 @@ class SteppedBall:
         self._place = place
         return np.asarray(np.mean(forces[-LOOK:], axis=0))
 
+    def _advance(self, place: np.ndarray) -> np.ndarray:
+        begin = time.process_time()
+        force = self.simulator.advance(place)
+        self._times.append(time.process_time() - begin)
+        return force
+
     def start(self, place: np.ndarray) -> None:
         """Put the body at rest, and the ball at a place outside."""
         self.simulator.reset()
-        self._left, self._last = 0.0, self.simulator.advance(place)
+        self._left, self._last = 0.0, self._advance(place)
         self._place = None
 
     def step(self, place: np.ndarray, seconds: float) -> np.ndarray:
         """Return the force (3,) after some time; a simulator with longer steps holds the last one in between."""
         self._left += seconds
         while self._left >= self.simulator.seconds * (1.0 - 1e-9):
-            self._last = self.simulator.advance(place)
+            self._last = self._advance(place)
             self._left -= self.simulator.seconds
         return self._last
 

@@ -160,7 +160,11 @@ def test_surfaces_that_bound_no_tool_are_refused(ball_file, tmp_path):
 
 @pytest.mark.parametrize(
     ("place", "radius", "words"),
-    [(30.0, RADIUS, "2 closed shells"), (0.8 * RADIUS, RADIUS, "2 closed shells"), (0.0, RADIUS / 2, "2 closed shells")],
+    [
+        (30.0, RADIUS, "2 closed shells"),
+        (0.8 * RADIUS, RADIUS, "2 closed shells"),
+        (0.0, RADIUS / 2, "2 closed shells"),
+    ],
     ids=["apart", "overlapping", "cavity"],
 )
 def test_a_tool_of_two_shells_is_refused(ball_file, tmp_path, place, radius, words):

@@ -11,16 +11,11 @@ from palpate.errors import UsageError
 
 __all__ = ["read_series"]
 
-UNEVEN = (
-    0.02  # of the distance between slices: how much it may vary, by the rounding of positions in the header
-)
+UNEVEN = 0.02  # share of the distance between slices by which rounded positions in the header may vary
 SEGMENTATION = "1.2.840.10008.5.1.4.1.1.66.4"  # class of objects whose frames hold a segment each
 CLASS, POSITION, ROWS = "0008|0016", "0020|0032", "0020|0037"
-PIXEL = (
-    "0028|0030",
-    "0018|1164",
-    "0018|2010",
-)  # that state the size of a pixel: of a scanner, of other images
+# tags of the size of a pixel: of a scanner, of a detector, of a print
+PIXEL = ("0028|0030", "0018|1164", "0018|2010")
 EXPORT = "Export one labelmap as NRRD or NIfTI; in 3D Slicer: Export to files, as a labelmap."
 
 
@@ -29,7 +24,7 @@ def read_series(path: Path) -> Any:
     import SimpleITK
 
     folder = path if path.is_dir() else path.parent
-    finder = SimpleITK.ImageSeriesReader
+    finder: Any = SimpleITK.ImageSeriesReader
     series = {
         name: finder.GetGDCMSeriesFileNames(str(folder), name)
         for name in finder.GetGDCMSeriesIDs(str(folder))

@@ -81,7 +81,7 @@ class PinchBaseline(PosedBaseline):
         return Gripper.of(json.loads(self.tool))
 
     @property
-    def surface(self) -> None:
+    def surface(self) -> None:  # type: ignore[override]  # the other contacts always have one
         """None: the centre, which a hand moves, lies within the body, and touches no surface itself."""
         return
 
@@ -103,7 +103,7 @@ class PinchBaseline(PosedBaseline):
         """Return the kernels and their arguments."""
         return Compiled(None, self._arguments(), enter=_enter_pinch)
 
-    def _arguments(self) -> tuple[Any, ...]:  # type: ignore[override]  # the balls of two jaws
+    def _arguments(self) -> tuple[Any, ...]:
         scratch = np.zeros((ROWS, 3, 3))
         scratch[TURN] = np.eye(3)  # balls are in the body's axes
         return (

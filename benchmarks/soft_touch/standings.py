@@ -7,17 +7,18 @@ NumPy is enough; the picture needs Matplotlib.
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
 if __package__:
-    from .case_files import CASES, case_names, read_case
+    from .case_files import CASES, Case, case_names, read_case
     from .judge import FIGURES, compare, figure_text
 else:  # beside judge.py as a file
-    from case_files import CASES, case_names, read_case
+    from case_files import CASES, Case, case_names, read_case
     from judge import FIGURES, compare, figure_text
 
-__all__ = ["ANSWERS", "METHODS", "draw", "standings", "standings_text", "sweep_rows"]
+__all__ = ["ANSWERS", "METHODS", "best_row", "draw", "standings", "standings_text", "sweep_rows"]
 
 ANSWERS = Path(__file__).parent / "answers"
 METHODS = {
@@ -43,14 +44,26 @@ def standings(
         found = []
         for method, title in METHODS.items():
             kept = _kept(method)["cases"].get(name)
-            if kept is not None and "best" in kept:
-                figures = compare(kept["best"], case)
-                found.append({"case": name, "method": title, "settings": kept["best"]["settings"], **figures})
+            if kept is not None:
+                answers = kept.get("best") or best_row(kept["sweep"], case)
+                found.append(
+                    {"case": name, "method": title, "settings": answers["settings"], **compare(answers, case)}
+                )
         for title, figures in (further or {}).items():
             if name in figures:
                 found.append({"case": name, "method": title, "settings": "", **figures[name]})
-        rows += sorted(found, key=lambda row: row["jnd_median"])
+        rows += sorted(found, key=_error)
     return rows
+
+
+def best_row(sweep: list[dict[str, Any]], case: Case) -> dict[str, Any]:
+    """Return the row of a sweep whose median force error is least; it has no more than forces."""
+    return min(sweep, key=lambda row: _error(compare(row, case)))
+
+
+def _error(figures: dict[str, Any]) -> float:
+    error = figures["jnd_median"]
+    return math.inf if error is None else float(error)
 
 
 def standings_text(rows: list[dict[str, Any]]) -> str:

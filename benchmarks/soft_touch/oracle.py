@@ -99,7 +99,7 @@ def solve_paths(name: str, seed: int, folder: File) -> Iterator[None]:
     plan = [(path, ELEMENT) for path in paths]
     if seed == SEED:  # a table of other places takes the mesh's part from the shipped one
         finer = [(paths[k], FINER * ELEMENT) for k in BOTH]
-        plan = [plan[0], finer[0], *plan[1:], *finer[1:]] if name == "block" else plan + finer
+        plan = [*plan[:3], finer[0], *plan[3:], *finer[1:]]
     for path, element in plan:
         first = path.number * STEPS
         if (first, "palpate", f"{element:g}") in read_solves(folder):

@@ -10,6 +10,7 @@ Times are those of the wall, beside whatever else the machine does.
 from __future__ import annotations
 
 import math
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -25,12 +26,7 @@ from palpate.study.run import Paths
 
 __all__ = ["tables"]
 
-OUTER, INNER, UP, VOXEL = (
-    20.0,
-    10.0,
-    5.0,
-    2.0,
-)  # mm: radii, how far the inner ball lies above the middle, a voxel
+OUTER, INNER, UP, VOXEL = 20.0, 10.0, 5.0, 2.0  # mm: radii, the inner ball above the middle, a voxel
 WANTED = 0.03  # relative force error at the 95th percentile of unseen solves
 LIMIT = 900.0  # s after which no further batch of solves begins
 # a name, materials as they are typed, and the most solves that were wanted
@@ -81,7 +77,7 @@ def _improve(case: str, materials: str, *, most: int, quick: bool) -> dict[str, 
                 row.setdefault("first", seconds)
             if step.phase == "judged" and math.isfinite(step.error):
                 row |= {"solves": step.solves, "median": step.median, "p95": step.error, "seconds": seconds}
-                print(row, flush=True)
+                print(row, file=sys.stderr, flush=True)
                 if step.error <= WANTED:
                     row["wanted_at"] = step.solves
             if step.reached or step.solves >= most:

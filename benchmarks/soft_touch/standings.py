@@ -106,28 +106,27 @@ def _kept(method: str) -> dict[str, Any]:
     return json.loads(path.read_text("utf-8")) if path.exists() else empty
 
 
-def draw(rows: list[dict[str, Any]], path: Path) -> None:
-    """Draw the force error in just noticeable differences over the seconds of a step, a panel for each case."""
-    from matplotlib import rc_context
+def draw(rows: list[dict[str, Any]]) -> Any:
+    """Return a figure of the force error in just noticeable differences over the seconds of a step, by case."""
     from matplotlib.figure import Figure
 
     cases = list(dict.fromkeys(row["case"] for row in rows))
     titles = list(dict.fromkeys(row["method"] for row in rows))
-    with rc_context({"svg.hashsalt": "soft-touch", "font.size": 9}):
-        figure = Figure(figsize=(2.6 * len(cases) + 1.2, 3.2), layout="constrained")
-        panels = figure.subplots(1, len(cases), sharex=True, sharey=True, squeeze=False)[0]
-        for panel, case in zip(panels, cases, strict=True):
-            for row in rows:
-                if row["case"] == case and row["seconds_step"]:
-                    k = titles.index(row["method"])
-                    ends = [row["jnd_median"], min(row["jnd_p95"], 1e3)]
-                    at = [1e3 * row["seconds_step"]] * 2
-                    panel.plot(at, ends, color=f"C{k}", linewidth=1.5)
-                    panel.plot(at[:1], ends[:1], "osD^vP*X"[k % 8], color=f"C{k}", label=row["method"])
-            panel.axhline(1.0, color="0.4", linewidth=0.8, linestyle="--")
-            panel.axvline(1.0, color="0.4", linewidth=0.8, linestyle=":")
-            panel.set(xscale="log", yscale="log", title=case, xlabel="ms a step")
-        panels[0].set_ylabel("force error, JND: median to 95th percentile")
-        handles = {label: h for p in panels for h, label in zip(*p.get_legend_handles_labels(), strict=True)}
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles))
-        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
+    figure = Figure(figsize=(2.6 * len(cases) + 1.2, 3.2), layout="constrained")
+    panels = figure.subplots(1, len(cases), sharex=True, sharey=True, squeeze=False)[0]
+    for panel, case in zip(panels, cases, strict=True):
+        for row in rows:
+            if row["case"] == case and row["seconds_step"]:
+                k = titles.index(row["method"])
+                ends = [row["jnd_median"], min(row["jnd_p95"], 1e3)]
+                duration = [1e3 * row["seconds_step"]] * 2
+                panel.plot(duration, ends, color=f"C{k}", linewidth=1.5)
+                mark = "osD^vP*X"[k % 8]
+                panel.plot(duration[:1], ends[:1], mark, color=f"C{k}", label=row["method"])
+        panel.axhline(1.0, color="0.4", linewidth=0.8, linestyle="--")
+        panel.axvline(1.0, color="0.4", linewidth=0.8, linestyle=":")
+        panel.set(xscale="log", yscale="log", title=case, xlabel="ms a step")
+    panels[0].set_ylabel("force error, JND: median to 95th percentile")
+    handles = {label: h for p in panels for h, label in zip(*p.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=max(len(handles), 1))
+    return figure

@@ -73,8 +73,8 @@ def cumulative_logit(counts: np.ndarray, design: np.ndarray, groups: int = 1) ->
     def loss(z: np.ndarray) -> float:
         cut = np.cumsum(np.concatenate([z[:1], np.exp(z[1:cuts])]))
         effects, tau = z[cuts : cuts + k], np.exp(z[-1])
-        at_node = (design @ effects)[:, None, :, None] + tau * _NODES[None, :, None, None]
-        below = expit(cut - at_node)
+        leaning = (design @ effects)[:, None, :, None] + tau * _NODES[None, :, None, None]
+        below = expit(cut - leaning)
         edge = np.zeros((*below.shape[:3], 1))
         share = np.diff(np.concatenate([edge, below, edge + 1.0], axis=3), axis=3)
         log = (counts[:, None] * np.log(np.maximum(share, _LEAST))).sum(axis=(2, 3))
@@ -131,7 +131,7 @@ def rate(
         place = kind - 1 if c == 0 else len(kinds) - 1 + kind * others + c - 1
         odds = None if effects is None or place < 0 else effects[place]
         low, middle, high = np.quantile(middles, [0.25, 0.5, 0.75]).tolist()
-        against = "the reference" if c else f"{kinds[0]}"
+        against = "the reference" if c else kinds[0]
         span = None if odds is None or not np.isfinite(odds).all() else (odds[0], odds[1], odds[2])
         results.append(
             RatingResult(

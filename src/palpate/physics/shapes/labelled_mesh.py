@@ -305,10 +305,11 @@ def _notes(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, 
         thick = 2 * wanted / max(around, 1e-12)
         said = f"{1e6 * there:.3g} ml of {name} in the mesh, {1e6 * wanted:.3g} ml in the voxels"
         if there < LOST * wanted:
+            finer = millimetres(min(KEEPS * thick, spacing / 2))
             raise UsageError(
                 f"Elements of {millimetres(spacing)} are too large for {name!r} in {path}.",
                 why=f"It is too thin: {said}.",
-                fix=f"Choose smaller ones, such as {millimetres(KEEPS * thick)}, or leave the label out.",
+                fix=f"Choose smaller ones, such as {finer}, or leave the label out.",
             )
         if thick < spacing or abs(there - wanted) > TELLS * wanted:
             told.append(

@@ -79,7 +79,11 @@ def test_a_scripted_participant_compares_the_full_model_with_a_surrogate(bodies,
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
-        for label in ("sub-01", "sub-02"):
+        for label, killed in (("sub-01", False), ("sub-02", True)):
+            if killed:  # in the middle of a touch
+                first = Sitting(browser, plan, label=label)
+                first.act(3, press=True, answer=stiffer)
+                first.end(kill=True)
             sitting = Sitting(browser, plan, label=label)
             sitting.act(TRIALS + 1, press=True, seconds=400.0, answer=stiffer)
             assert sitting.end() == 0

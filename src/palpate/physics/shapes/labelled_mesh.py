@@ -28,6 +28,7 @@ from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volum
 from palpate.physics.shapes.mesh_file import refine_mesh
 from palpate.physics.shapes.meshing import GRADING, THREADS, FineMesh, require_budget
 from palpate.physics.shapes.naming import require_name
+from palpate.physics.shapes.packed_file import require_file
 from palpate.physics.shapes.scan_file import LabelImage, clear_specks, name_labels, read_scan
 from palpate.physics.shapes.shape import Shape, require_size
 
@@ -118,6 +119,7 @@ class ImportedScan(Shape):
         if self.element is not None:
             checks.positive("The element size", self.element, "m")
         if part_kind(self.path) != "scan":
+            require_file(self.path)  # a folder that is gone has no kind
             raise UsageError(
                 f"{self.path} is no labelmap of a scan.",
                 why=f"Its name ends in {Path(self.path).suffix or 'nothing'!r}.",

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from benchmarks.experiment_plans import simulate_raters
 from scipy.special import logit
 
 from palpate.experiments.ratings import cumulative_logit
-from palpate.experiments.simulation import simulate_raters
 
 
 def test_two_ratings_of_many_equal_people_are_a_logistic_regression():

@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
-import math
 import sys
 import time
 from collections.abc import Iterator
@@ -24,10 +23,10 @@ import numpy as np
 
 from benchmarks.machine import machine_line
 from benchmarks.soft_touch.case_files import CASES, Case, case_names, read_case
-from benchmarks.soft_touch.judge import compare, question
-from benchmarks.soft_touch.standings import ANSWERS, METHODS
+from benchmarks.soft_touch.judge import question
+from benchmarks.soft_touch.standings import ANSWERS, METHODS, best_row
 
-__all__ = ["ask", "best_setting", "sweep"]
+__all__ = ["ask", "sweep"]
 
 SWEPT_PATHS = 2
 PACKAGES = {"mujoco_flex": ("mujoco",), "newton_vbd": ("newton", "warp-lang"), "force_rbf": ("scipy",)}
@@ -47,11 +46,6 @@ def sweep(
             spent = time.process_time() - begin
             answers = {"press": few.presses, "at_presses": forces, "seconds": spent}
             yield {"setting": setting, "settings": method.settings, **answers}
-
-
-def best_setting(case: Case, kept: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the setting whose median force error is least."""
-    return dict(min(kept, key=lambda row: compare(row, case)["jnd_median"] or math.inf)["setting"])
 
 
 def settings_of(name: str, case: Case) -> list[dict[str, Any]]:
@@ -98,7 +92,7 @@ def ask(name: str, case: str, kept: dict[str, Any], options: argparse.Namespace)
     if case not in case_names() or not kept["sweep"]:
         return
     whole = read_case(case)
-    setting, asked = best_setting(whole, kept["sweep"]), _first_paths(whole, options.paths)
+    setting, asked = best_row(kept["sweep"], whole)["setting"], _first_paths(whole, options.paths)
     before = kept.get("best", {})
     if before.get("setting") != setting or before["press"] != asked.presses:
         answers = question(load(name, whole, setting), asked, loops=options.loops)

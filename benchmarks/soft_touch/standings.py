@@ -7,19 +7,21 @@ NumPy is enough; the picture needs Matplotlib.
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
 if __package__:
-    from .case_files import CASES, case_names, read_case
+    from .case_files import CASES, Case, case_names, read_case
     from .judge import FIGURES, compare, figure_text
 else:  # beside judge.py as a file
-    from case_files import CASES, case_names, read_case
+    from case_files import CASES, Case, case_names, read_case
     from judge import FIGURES, compare, figure_text
 
-__all__ = ["ANSWERS", "METHODS", "draw", "standings", "standings_text", "sweep_rows"]
+__all__ = ["ANSWERS", "METHODS", "best_row", "draw", "standings", "standings_text", "sweep_rows"]
 
 ANSWERS = Path(__file__).parent / "answers"
+WORST = 10.0  # JND, at which the picture ends
 METHODS = {
     "palpate_surrogate": "palpate's surrogate",
     "force_rbf": "RBF on forces (SciPy)",
@@ -43,14 +45,26 @@ def standings(
         found = []
         for method, title in METHODS.items():
             kept = _kept(method)["cases"].get(name)
-            if kept is not None and "best" in kept:
-                figures = compare(kept["best"], case)
-                found.append({"case": name, "method": title, "settings": kept["best"]["settings"], **figures})
+            if kept is not None:
+                answers = kept.get("best") or best_row(kept["sweep"], case)
+                found.append(
+                    {"case": name, "method": title, "settings": answers["settings"], **compare(answers, case)}
+                )
         for title, figures in (further or {}).items():
             if name in figures:
                 found.append({"case": name, "method": title, "settings": "", **figures[name]})
-        rows += sorted(found, key=lambda row: row["jnd_median"])
+        rows += sorted(found, key=_error)
     return rows
+
+
+def best_row(sweep: list[dict[str, Any]], case: Case) -> dict[str, Any]:
+    """Return the row of a sweep whose median force error is least; it has no more than forces."""
+    return min(sweep, key=lambda row: _error(compare(row, case)))
+
+
+def _error(figures: dict[str, Any]) -> float:
+    error = figures["jnd_median"]
+    return math.inf if error is None else float(error)
 
 
 def standings_text(rows: list[dict[str, Any]]) -> str:
@@ -92,12 +106,13 @@ def sweep_rows() -> list[dict[str, Any]]:
 
 def sources() -> dict[str, str]:
     """Return by the methods' titles the versions and the machine that their answers come from."""
-    kept = {title: _kept(method) for method, title in METHODS.items()}
-    return {
-        title: "; ".join(filter(None, (k["versions"], k["machine"])))
-        for title, k in kept.items()
-        if k["cases"]
-    }
+    lines = {}
+    for method, title in METHODS.items():
+        kept = _kept(method)
+        if kept["cases"]:
+            own = kept["machine"].split("; ")[:2]  # date and processor
+            lines[title] = "; ".join(filter(None, (kept["versions"], *own)))
+    return lines
 
 
 def _kept(method: str) -> dict[str, Any]:
@@ -107,26 +122,24 @@ def _kept(method: str) -> dict[str, Any]:
 
 
 def draw(rows: list[dict[str, Any]]) -> Any:
-    """Return a figure of the force error in just noticeable differences over the seconds of a step, by case."""
+    """Return a figure of the force error of each method in just noticeable differences, a panel for each case."""
     from matplotlib.figure import Figure
 
     cases = list(dict.fromkeys(row["case"] for row in rows))
-    titles = list(dict.fromkeys(row["method"] for row in rows))
-    figure = Figure(figsize=(2.6 * len(cases) + 1.2, 3.2), layout="constrained")
+    titles = list(dict.fromkeys(row["method"] for row in rows))[::-1]
+    figure = Figure(figsize=(1.8 * len(cases) + 2.2, 0.35 * len(titles) + 1.2), layout="constrained")
     panels = figure.subplots(1, len(cases), sharex=True, sharey=True, squeeze=False)[0]
     for panel, case in zip(panels, cases, strict=True):
         for row in rows:
-            if row["case"] == case and row["seconds_step"]:
-                k = titles.index(row["method"])
-                ends = [row["jnd_median"], min(row["jnd_p95"], 1e3)]
-                duration = [1e3 * row["seconds_step"]] * 2
-                panel.plot(duration, ends, color=f"C{k}", linewidth=1.5)
-                mark = "osD^vP*X"[k % 8]
-                panel.plot(duration[:1], ends[:1], mark, color=f"C{k}", label=row["method"])
-        panel.axhline(1.0, color="0.4", linewidth=0.8, linestyle="--")
-        panel.axvline(1.0, color="0.4", linewidth=0.8, linestyle=":")
-        panel.set(xscale="log", yscale="log", title=case, xlabel="ms a step")
-    panels[0].set_ylabel("force error, JND: median to 95th percentile")
-    handles = {label: h for p in panels for h, label in zip(*p.get_legend_handles_labels(), strict=True)}
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=max(len(handles), 1))
+            if row["case"] == case and row["jnd_median"] is not None:
+                place = titles.index(row["method"])
+                ends = [min(row[key], WORST) for key in ("jnd_median", "jnd_p95")]
+                panel.plot(ends, [place, place], color="C0", linewidth=2.0)
+                panel.plot(ends[:1], [place], "o", color="C0")
+        panel.axvline(1.0, color="0.4", linewidth=0.8, linestyle="--")
+        panel.set(title=case)
+        panel.set_xlim(left=0.0)
+    panels[0].set_yticks(range(len(titles)), titles)
+    panels[0].set_ylim(-0.5, len(titles) - 0.5)
+    figure.supxlabel("force error, JND: median to 95th percentile", fontsize=9)
     return figure

@@ -108,7 +108,7 @@ def _rows(
 ) -> list[dict[str, Any]]:
     """Return the standings; at places of a seed those of the methods that can be asked anew."""
     if seed is None:
-        own = _judged(judging, file, {name: judging.read_case(name) for name in cases}) if file else {}
+        own = _figures(judging, file, {name: judging.read_case(name) for name in cases}) if file else {}
         return list(standing.standings(cases, own))
     with tempfile.TemporaryDirectory() as scratch:
         make_places = _module(_folder(), "make_cases").make_places
@@ -116,8 +116,8 @@ def _rows(
             make_places(name, seed, Path(scratch) / name)
         read = {name: judging.read_case(name, Path(scratch)) for name in cases}
         learnt = _folder() / "methods" / "palpate_surrogate.py"
-        figures = {"palpate's surrogate": _judged(judging, learnt, read)["palpate_surrogate.py"]}
-        figures |= _judged(judging, file, read) if file else {}
+        figures = {"palpate's surrogate": _figures(judging, learnt, read)["palpate_surrogate.py"]}
+        figures |= _figures(judging, file, read) if file else {}
     return [
         {"case": name, "method": title, "settings": f"places of seed {seed}", **of_cases[name]}
         for name in cases
@@ -125,7 +125,7 @@ def _rows(
     ]
 
 
-def _judged(judging: Any, file: Path, cases: dict[str, Any]) -> dict[str, dict[str, Any]]:
+def _figures(judging: Any, file: Path, cases: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the figures of a method's file by its name and the cases."""
     return {
         file.name: {

@@ -12,7 +12,7 @@ from palpate.dataset import Dataset
 from palpate.format import duration, share
 from palpate.options import StopOptions
 from palpate.surrogates import Surrogate
-from palpate.validation.unseen_solves import ForceSamples, TouchSolves
+from palpate.validation.unseen_solves import ForceSamples, TouchFunction, TouchSolves
 
 __all__ = ["AnswerStopRule", "StopRule", "relative_errors"]
 
@@ -21,10 +21,10 @@ def relative_errors(surrogate: Surrogate, unseen: Dataset | None) -> np.ndarray:
     """Return the relative force errors (N,) of a surrogate on unseen solves that are stronger than a light touch."""
     if unseen is None or not len(unseen.ok):
         return np.empty(0)
-    energy = surrogate.hand_energy
-    solves = TouchSolves.of(unseen, energy.inputs)
-    answer, inside = energy.force(solves.X), np.ones(len(solves), dtype=bool)
-    samples = ForceSamples(solves.X[:, :3], solves.force, answer, inside)
+    function = TouchFunction.of(surrogate)
+    solves = TouchSolves.of(unseen, function.inputs)
+    inside = np.ones(len(solves), dtype=bool)
+    samples = ForceSamples(solves.X[:, :3], solves.force, function.force(solves.X), inside)
     return np.asarray(samples.relative[samples.heavy])
 
 

@@ -1,7 +1,8 @@
 """Study: the whole way, from the body to the touch, as one declared, frozen record.
 
 study                the record: a body, what acts on it, and the tables of its stages
-body_records         `[body]`          loads_kind, probe_kind, pad_kind, memory_kind   what acts on it, with its tables
+body_records         `[body]`
+loads_kind, probe_kind, tool_kind, pinch_kind, pad_kind, memory_kind   what acts on it, with its tables
 material_records     materials         part_records          `[body]` of a part, and names for its surfaces
 stage_records        the registry of the tables of each kind, and what several kinds share; `[runtime]`
 interaction_records  what acts on a surface, and `[[varied]]`

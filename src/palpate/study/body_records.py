@@ -152,7 +152,7 @@ class CantileverRecord(Record):
 class _SolidRecord(Record):
     """Base of the solid bodies."""
 
-    INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "tool", "pad")
+    INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "tool", "pinch", "pad")
     SURFACES: ClassVar[tuple[str, ...]] = ("top", "bottom")
 
     element: Metres | None = Field(

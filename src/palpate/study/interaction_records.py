@@ -12,7 +12,7 @@ from palpate.physics.solid.body_family import BESIDE, UNITS
 from palpate.records import Number, Record, in_si
 from palpate.study.body_records import BodyRecord
 
-__all__ = ["OnSurface", "VariedRecord", "require_corners", "stiffness_or_rigid"]
+__all__ = ["OnSurface", "VariedRecord", "require_corners", "require_depth", "stiffness_or_rigid"]
 
 
 class OnSurface(Record):
@@ -35,6 +35,15 @@ def require_corners(over: tuple[Any, Any] | None) -> None:
         raise ValueError(
             "the corners of `over` are not in order: the lower one comes first; for example "
             '[["30 mm", "30 mm"], ["70 mm", "70 mm"]]'
+        )
+
+
+def require_depth(depth: tuple[float, float]) -> None:
+    """Refuse a least and a largest depth in m that are no range from 0 on."""
+    if not 0 <= depth[0] < depth[1]:
+        raise ValueError(
+            f"the depth {depth[0]:g} … {depth[1]:g} m is no range from 0 on; it is measured into the "
+            'body, the least one first; for example depth = ["0.2 mm", "5 mm"]'
         )
 
 

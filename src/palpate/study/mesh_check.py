@@ -140,7 +140,7 @@ def load_finer(study: Study, paths: Paths) -> Dataset | None:
 
 def _spread_rows(unseen: Dataset, number: int) -> np.ndarray:
     """Return inputs (≤ number, n) of unseen solves from a light touch to the strongest, evenly by rank of the force."""
-    size = np.linalg.norm(np.asarray(unseen.response)[:, :3], axis=1)
+    size = np.linalg.norm(TouchSolves.of(unseen, unseen.ranges).force, axis=1)
     heavy = np.flatnonzero(size > LIGHT * size.max(initial=0.0))
     order = heavy[np.argsort(size[heavy], kind="stable")]
     ranks = (np.arange(min(number, len(order))) + 0.5) / max(number, 1) * len(order)

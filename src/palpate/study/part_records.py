@@ -147,7 +147,7 @@ class PartSurfaceRecord(Record):
 class PartRecord(Record):
     """A part from a file: a surface such as STL, CAD such as STEP, a mesh such as VTU, or the labelmap of a scan."""
 
-    INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "tool", "pad")
+    INTERACTIONS: ClassVar[tuple[str, ...]] = ("probe", "tool", "pinch", "pad")
 
     kind: Literal["part"] = "part"
     file: str = Field(min_length=1, description="beside the study file", examples=["part.stl"])

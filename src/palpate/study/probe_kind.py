@@ -11,7 +11,7 @@ from palpate.physics.shapes.naming import members
 from palpate.physics.solid.body_symmetry import fundamental_part
 from palpate.records import Count, Metres, PadStiffness, Pair, Record, Triple
 from palpate.study.body_records import BodyRecord
-from palpate.study.interaction_records import OnSurface, require_corners, stiffness_or_rigid
+from palpate.study.interaction_records import OnSurface, require_corners, require_depth, stiffness_or_rigid
 from palpate.study.stage_records import SECTIONS, EnergyLearningRecord, PressSweepRecord, TouchTargetRecord
 
 __all__ = ["ProbeLearningRecord", "ProbeRecord", "ProbeSweepRecord", "ProbeTestRecord"]
@@ -55,11 +55,7 @@ class ProbeRecord(OnSurface):
 
     @model_validator(mode="after")
     def _in_order(self) -> ProbeRecord:
-        if not 0 <= self.depth[0] < self.depth[1]:
-            raise ValueError(
-                f"the depth {self.depth[0]:g} … {self.depth[1]:g} m is no range from 0 on; it is measured into the "
-                'body, the least one first; for example depth = ["0.2 mm", "8 mm"]'
-            )
+        require_depth(self.depth)
         require_corners(self.over)
         return self
 

@@ -1,7 +1,8 @@
 """Tables of the stages of a study, as far as several kinds of interactions share them, and the registry of all.
 
 The keys of a table depend on what acts on the body; each kind says its tables in its own file (`loads_kind`,
-`probe_kind`, `pad_kind`, `memory_kind`) and enters them in `SECTIONS`. A table says by itself how its stage is called.
+`probe_kind`, `tool_kind`, `pinch_kind`, `pad_kind`, `memory_kind`) and enters them in `SECTIONS`. A table says by
+itself how its stage is called.
 """
 
 from __future__ import annotations

@@ -24,6 +24,7 @@ from palpate.study.loads_kind import (
 )
 from palpate.study.memory_kind import HistoryTargetRecord, MemoryRecord
 from palpate.study.pad_kind import PadRecord, PadSweepRecord, PadTestRecord
+from palpate.study.pinch_kind import PinchRecord
 from palpate.study.probe_kind import ProbeLearningRecord, ProbeRecord, ProbeSweepRecord, ProbeTestRecord
 from palpate.study.stage_records import (
     SECTIONS,
@@ -38,7 +39,7 @@ __all__ = ["InteractionRecord", "Study"]
 
 _TABLES = ("sweep", "test", "filter", "learning", "target")
 
-InteractionRecord: TypeAlias = LoadsRecord | ProbeRecord | ToolRecord | PadRecord
+InteractionRecord: TypeAlias = LoadsRecord | ProbeRecord | ToolRecord | PinchRecord | PadRecord
 Sweep: TypeAlias = LoadSweepRecord | ProbeSweepRecord | ToolSweepRecord | PadSweepRecord
 Test: TypeAlias = LoadTestRecord | ProbeTestRecord | PadTestRecord
 Learning: TypeAlias = LoadLearningRecord | ProbeLearningRecord | EnergyLearningRecord
@@ -108,8 +109,12 @@ class Study(Record):
             )
         if fault := acting.fault(body):
             raise ValueError(fault)
-        if self.runtime.friction and not self.presses:
-            raise ValueError("[runtime] friction is of a tool that slides on a body; this one is held")
+        pinched = isinstance(acting, PinchRecord)
+        if self.runtime.friction and (pinched or not self.presses):
+            state = "pinched by two jaws" if pinched else "held"
+            raise ValueError(f"[runtime] friction is of a tool that slides on a body; this one is {state}")
+        if self.varied and pinched:
+            raise ValueError("nothing of a body that two jaws pinch can vary: make a study of each")
         remembers = self.memory is not None
         if body.has_memory and not remembers:
             raise ValueError(
@@ -162,7 +167,8 @@ class Study(Record):
         element = self.sweep.element if self.sweep else None
         part = self.sweep is not None and self.sweep.symmetric and not whole
         # a tool judges its edge by the size of the elements
-        sized: dict[str, Any] = {"element": element} if isinstance(self.interaction, ToolRecord) else {}
+        edged = isinstance(self.interaction, ToolRecord | PinchRecord)
+        sized: dict[str, Any] = {"element": element} if edged else {}
         acting = self.interaction.build(body, whole=not part, **sized)
         varied = tuple(Varied(v.path, v.low, v.high) for v in self.varied)
         family: Any = BodyFamily(body, varied) if varied else body

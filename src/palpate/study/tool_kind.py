@@ -12,7 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from palpate.errors import UsageError
 from palpate.physics import SurfaceTool, read_tool
 from palpate.records import Metres, PadStiffness, Pair, Radians, Record, Triple
-from palpate.study.interaction_records import OnSurface, require_corners, stiffness_or_rigid
+from palpate.study.interaction_records import OnSurface, require_corners, require_depth, stiffness_or_rigid
 from palpate.study.probe_kind import ProbeLearningRecord, ProbeTestRecord
 from palpate.study.stage_records import SECTIONS, PressSweepRecord, TouchTargetRecord
 from palpate.tools import (
@@ -226,11 +226,7 @@ class ToolRecord(OnSurface):
 
     @model_validator(mode="after")
     def _in_order(self) -> ToolRecord:
-        if not 0 <= self.depth[0] < self.depth[1]:
-            raise ValueError(
-                f"the depth {self.depth[0]:g} … {self.depth[1]:g} m is no range from 0 on; it is measured into the "
-                'body, the least one first; for example depth = ["0.2 mm", "5 mm"]'
-            )
+        require_depth(self.depth)
         require_corners(self.over)
         return self
 

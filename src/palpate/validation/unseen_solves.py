@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.errors import UsageError
 from palpate.learning.pad_solves import is_padded, pad_solves
-from palpate.surrogates import Surrogate
+from palpate.surrogates import LearntEnergy, Surrogate
+from palpate.surrogates.grip_effort import efforts
+from palpate.tools.gripper import OPENING
 from palpate.units import Range
 from palpate.validation.limits import FAINT, FAINT_JND, FORCE_JND
 
-__all__ = ["ForceSamples", "TouchFunction", "TouchSolves", "force_jnd"]
+__all__ = ["ForceSamples", "TouchFunction", "TouchSolves", "felt_force", "force_jnd"]
 
 Answer = Callable[[np.ndarray], np.ndarray]
 
@@ -33,8 +36,8 @@ class ForceSamples:
     """
 
     hand: np.ndarray  # (N, k), where it is, m
-    truth: np.ndarray  # (N, 3), of the finite-element solve, N
-    answer: np.ndarray  # (N, 3), of the model, N
+    truth: np.ndarray  # (N, 3), of the finite-element solve, N; of two jaws (N, 4), with their effort
+    answer: np.ndarray  # the same of the model, N
     inside: np.ndarray  # (N,) bool, the model called the place inside its trained range
 
     @property
@@ -77,8 +80,8 @@ class TouchSolves:
     ----------
     X : (N, n)
         Centre of the probe (m), then further inputs.
-    force : (N, 3)
-        F on the probe, N.
+    force : (N, 3) or (N, 4)
+        F on the probe, N; of two jaws the effort of their opening beside it.
     energy : (N,), optional
         U, J; zero without contact.
     stiffness : (N, 3, 3), optional
@@ -113,7 +116,9 @@ class TouchSolves:
     def _fault(self) -> str:
         if self.X.ndim != 2 or self.X.shape[1] < 3 or not len(self.X):
             return f"their inputs have shape {self.X.shape}"
-        wanted = {"force": (3,), "energy": (), "stiffness": (3, 3)}
+        wanted = {"force": self.force.shape[1:], "energy": (), "stiffness": (3, 3)}
+        if wanted["force"] not in {(3,), (4,)}:
+            return f"their force has shape {self.force.shape}"
         for name, rest in wanted.items():
             value = getattr(self, name)
             if value is not None and value.shape != (len(self.X), *rest):
@@ -163,7 +168,7 @@ class TouchSolves:
         gradient = "response_gradient" in test
         return cls(
             test.X,
-            test.response[:, :3],
+            test.response[:, : 3 + _has_opening(test.ranges)],
             test.potential_energy if "potential_energy" in test else None,
             test.response_gradient[:, :3, :3] if gradient else None,
             test,
@@ -179,6 +184,16 @@ def _refuse_inputs(found: list[str], inputs: Sequence[Range], wanted: list[str] 
     )
 
 
+def felt_force(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
+    """Return the force (N, 3) in N at inputs X (N, n); of two jaws with their effort (N, 4)."""
+    force = energy.force(X)
+    return np.column_stack([force, efforts(energy, X)]) if _has_opening(energy.inputs) else force
+
+
+def _has_opening(inputs: Sequence[Range]) -> bool:
+    return OPENING in {r.name for r in inputs}
+
+
 @dataclass(frozen=True, eq=False)
 class TouchFunction:
     """Function of place that answers the force: that of a surrogate, or any other beside which it is judged.
@@ -189,8 +204,8 @@ class TouchFunction:
         Name in tables and headings.
     inputs : n ranges
         Names, trained ranges and units of the inputs; the first three are coordinates in m.
-    force : callable (N, n) → (N, 3)
-        N.
+    force : callable (N, n) → (N, 3) or (N, 4)
+        N; of two jaws with their effort.
     energy, stiffness, depth, inside, deviation : callable, optional
         (N, n) → (N,) in J, (N, 3, 3) in N/m, (N,) in m, (N,) bool, (N,) relative to the force. What is missing is
         not judged, and said not to be.
@@ -220,7 +235,7 @@ class TouchFunction:
         return cls(
             model.name,
             energy.inputs,
-            energy.force,
+            partial(felt_force, energy),
             energy.energy,
             energy.stiffness,
             None if energy.baseline.holds else energy.depth,

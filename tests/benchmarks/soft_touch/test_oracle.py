@@ -7,7 +7,10 @@ import csv
 import numpy as np
 import pytest
 from benchmarks.soft_touch.bodies import BODIES, CASES, RADIUS, SEED, STEPS, paths_of
+from benchmarks.soft_touch.make_cases import make_places
 from benchmarks.soft_touch.oracle import ELEMENT, read_solves, solve_path
+
+from benchmarks.soft_touch import oracle
 
 
 def table(file):
@@ -79,3 +82,22 @@ def test_at_the_smallest_depth_the_block_is_near_hertz():
     hertz = 4 / 3 * 15e3 / (1 - 0.45**2) * np.sqrt(RADIUS) * depth[0] ** 1.5
     chi = np.sqrt(RADIUS * depth[0]) / 0.05
     assert force[0] / hertz == pytest.approx(1 + 1.08 * chi, abs=0.05)
+
+
+def test_another_seed_makes_other_places_with_an_oracle_of_their_own(monkeypatch, tmp_path):
+    """Hertz's forces stand in for the solves; the shipped case lends the mesh's part and CalculiX's difference."""
+
+    def hertz(name, path, element):
+        depth = path.depths[:, None]
+        force = 2e4 * np.sqrt(RADIUS) * depth**1.5
+        return np.hstack([force * path.normal, 1.5 * force / depth, 0.4 * force * depth]).tolist()
+
+    monkeypatch.setattr(oracle, "solve_path", hertz)
+    make_places("block", 7, tmp_path / "block")
+    presses, made = (table(tmp_path / "block" / f"{part}.csv") for part in ("presses", "oracle"))
+    assert presses["press"].tolist() == made["press"].tolist() == list(range(60))
+    assert (made["force_error"] > 0).all()
+    shipped = table(CASES / "block" / "presses.csv")
+    assert not set(presses["x"]) & set(shipped["x"])
+    ideal = 2e4 * np.sqrt(RADIUS) * presses["depth"] ** 1.5
+    np.testing.assert_allclose(made["fz"], ideal, rtol=0.05)

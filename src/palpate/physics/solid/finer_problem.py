@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.physics.interactions.pinch import Pinch
 from palpate.physics.interactions.pressing import PressingTool
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.shapes.meshing import FineMesh
@@ -28,14 +29,20 @@ NEAR = 0.25
 def finer_problem(problem: Any, places: np.ndarray) -> Any:
     """Return a problem of a body, or of a family, whose mesh is twice as fine around what presses at places (N, n ≥ 3).
 
-    Elsewhere the mesh is as fine as that of `problem`, on which one ball or tool acts.
+    Elsewhere the mesh is as fine as that of `problem`, on which one ball, tool or pair of jaws acts.
     """
     base = getattr(problem, "base", problem)
-    probe = next(part for part in base.interactions if isinstance(part, PressingTool))
+    pressing = next(part for part in base.interactions if isinstance(part, PressingTool | Pinch))
+    X = np.asarray(places, dtype=float)
+    probe: PressingTool
+    if isinstance(pressing, Pinch):  # both jaws press
+        probe, sites = max(pressing.tools, key=_reach), np.concatenate(pressing.gripper.places(X))
+    else:
+        probe, sites = pressing, X[:, :3]
     wide = base.refinements
     size = FINER * min(part.element for part in wide if part.surface in {probe.meets, probe.touches})
     half = REACH * _reach(probe)
-    corners = [np.array([place - half, place + half]) for place in np.asarray(places, dtype=float)[:, :3]]
+    corners = [np.array([place - half, place + half]) for place in sites]
     near = min(size, NEAR * probe.shape.size)
     levels = [np.array([*base.body.geometry.rest().corners])]
     levels += [np.array([part.lower, part.upper]) for part in wide if part.lower is not None]

@@ -152,7 +152,7 @@ class Work:
 def work_of_polygons(
     force: Callable[[np.ndarray], np.ndarray], corners: list[np.ndarray], most: int = 40_000
 ) -> Work:
-    """Return the work around polygons under a force, (M, n) inputs in m → (M, 3) N.
+    """Return the work around polygons under a force, (M, n) inputs in m → (M, 3) N, or (M, 4) with an effort.
 
     Each polygon's corners are inputs (c, n); the last leads back to the first, and inputs beyond the third must not
     change. At most `most` intervals are halved at a time; the others are left open.
@@ -207,7 +207,8 @@ def _rule(
     x, w = _lobatto()
     t = low[:, None] + width[:, None] * (x + 1) / 2
     X = begin[:, None] + t[:, :, None] * (end - begin)[:, None]
-    F = force(np.ascontiguousarray(X.reshape(-1, X.shape[2]))).reshape(len(t), ORDER, 3)
+    # of two jaws the effort stands beside the force: the opening does not change, so it does no work
+    F = force(np.ascontiguousarray(X.reshape(-1, X.shape[2])))[:, :3].reshape(len(t), ORDER, 3)
     power = np.einsum("mqi,mi->mq", F, (end - begin)[:, :3]) * w / 2 * width[:, None]
     return power.sum(axis=1), np.abs(power).sum(axis=1)
 

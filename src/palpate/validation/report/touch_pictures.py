@@ -13,7 +13,7 @@ from palpate.surrogates import LearntEnergy, TouchedSurface
 from palpate.validation.figures.smoothness import Smoothness
 from palpate.validation.report.chapter import Chapter
 from palpate.validation.report.style import INK, Picture, figure, loads_map, picture, series
-from palpate.validation.unseen_solves import ForceSamples, TouchSolves
+from palpate.validation.unseen_solves import ForceSamples, TouchSolves, felt_force
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -225,7 +225,7 @@ def _curve(
 ) -> Curve:
     line = np.repeat(X[i][None], 121, axis=0)
     line[:, :3] += np.linspace(0.0, 1.0, 121)[:, None] * depth[i] * normal
-    force = np.linalg.norm(energy.force(line), axis=1)
+    force = np.linalg.norm(felt_force(energy, line), axis=1)
     return Curve(energy.depth(line), force, rows[np.argsort(-depth[rows])])
 
 

@@ -219,8 +219,9 @@ function subtitle(hello: Hello): (Node | string)[] {
   // the words of a tool are long, and may be parted
   const probe = hello.tool ? hello.tool.words : whole(`probe of radius ${measured(hello.radius, "m")}`);
   const press = [probe, whole(`trained to ${measured(hello.deepest, "m")} deep`)];
-  // the words of a tool tell how far it turns
-  const ranges = hello.holds ? hello.inputs : hello.parameters.filter((_, i) => !hello.tool?.turns.includes(i));
+  // the words of a tool tell how far it turns; friction is not trained, and stands with what is remembered
+  const further = hello.parameters.filter(({ name }, i) => name !== "friction" && !hello.tool?.turns.includes(i));
+  const ranges = hello.holds ? hello.inputs : further;
   const parts = [...(hello.holds ? [] : press), ...trained(ranges)];
   const joined = parts.flatMap((part, i) => (i === 0 ? [part] : [", ", part]));
   return hello.holds ? ["trained on ", ...joined] : joined;

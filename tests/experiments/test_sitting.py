@@ -172,9 +172,8 @@ def test_analysis_finds_each_person_and_the_group(folder):
 
 
 def test_rows_of_a_picture_are_people_also_where_conditions_have_others(tmp_path):
-    (tmp_path / "plan.toml").write_text(
-        ready_plan("discrimination", "two", ["a.palpate"] * 2 + ["c.palpate"])
-    )
+    text = ready_plan("discrimination", "two", ["a.palpate", "a.palpate", "c.palpate"])
+    (tmp_path / "plan.toml").write_text(text, "utf-8")
     people = tuple(
         PersonResult(f"sub-{k}", condition, 80, (0.1 * k - 0.1, 0.1 * k, 0.1 * k + 0.1), (0.1, 0.2, 0.3), 0.0,
                      1.0, 0.5, (), ((0.0, 0.5, 80),))

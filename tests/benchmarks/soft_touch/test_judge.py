@@ -17,11 +17,15 @@ from benchmarks.soft_touch.judge import (
     delay,
     judge,
     monotone_cubic,
+    plain_figures,
     question,
     read_case,
     read_method,
 )
 from half_space_case import RADIUS, STIFF, force, loop, write_case, write_rows
+
+from exported_bodies import body
+from palpate.export import export_fmu
 
 FOLDER = Path(__file__).parents[3] / "benchmarks" / "soft_touch"
 
@@ -124,6 +128,50 @@ def test_a_table_gives_no_stiffness(case, tmp_path):
     write_rows(table, "press fx fy fz", rows[1:])
     with pytest.raises(JudgeError, match="lacks 1 of 20 presses, among them 0"):
         read_method(table, case)
+
+
+def test_an_fmu_gives_the_force_of_each_place(case, tmp_path):
+    """Places that follow each other anyhow, each with its own force, and strokes without delay."""
+    block = body("contact")
+    export_fmu(block, tmp_path / "block.fmu", name="block", check=False)
+    method = read_method(tmp_path / "block.fmu", case)
+    places = np.random.default_rng(4).uniform([-0.004, -0.004, 0.008], [0.004, 0.004, 0.0095], (20, 3))
+    modulus = block.energy.inputs[3]  # the FMU starts in its middle
+    X = np.column_stack([places, np.full(len(places), (modulus.low + modulus.high) / 2)])
+    np.testing.assert_allclose(method.force(places), block.energy.force(X), rtol=1e-9, atol=1e-12)
+    answers = question(method, case)
+    assert len(answers["at_presses"]) == len(case.presses)
+    assert (
+        abs(answers["lateness"]) < 1.5
+    )  # ms: the block is no half-space; an FMU answers at the end of a step
+
+
+class _Failing:
+    """A simulator whose strokes fail."""
+
+    force = staticmethod(force)
+
+    def start(self, place):
+        raise RuntimeError("no body")
+
+    def step(self, place, seconds):
+        return np.zeros(2)
+
+
+def test_a_simulator_that_fails_in_a_stroke_is_named(case):
+    with pytest.raises(JudgeError, match="no body"):
+        judge(_Failing(), case)
+    short = _Failing()
+    short.start = lambda place: None
+    with pytest.raises(JudgeError, match=r"an array of shape \(2,\)"):
+        judge(short, case)
+
+
+def test_figures_in_json_are_valid_without_an_answer(case):
+    figures = judge(lambda places: np.full(places.shape, np.nan), case)
+    plain = json.loads(json.dumps(plain_figures(figures), allow_nan=False))
+    assert plain["force_median"] == "no answer"
+    assert plain["loop_work"] is None
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,6 @@ BENCHMARKS = (
     "refinement",
     "runtime",
     "scale",
-    "scans",
     "simulator_forces",
     "soft_bodies",
     "stability",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import sync_playwright
 from scripted_participant import Sitting, shortened
+from test_sitting import run_through
 
 import palpate as pp
 from palpate.errors import UsageError
@@ -16,7 +17,7 @@ from palpate.experiments.study_folder import StudyFolder, read_table
 from palpate.runtime.touchable import touchable
 from viewer.chromium_page import ARGUMENTS
 
-TRIALS, NOISE = 22, 0.07
+TRIALS, LIVE, PEOPLE = 40, 6, 12
 
 
 def problem():
@@ -60,10 +61,19 @@ def test_a_body_that_is_held_has_no_line():
         solve_presses(None, touchable(spring_beam()), None)
 
 
+def force_ratio(bodies: dict) -> float:
+    """The logarithm of the surrogate's force over the full model's, half as deep as the reference was trained."""
+    places = {name: touchable(body) for name, body in bodies.items()}
+    whole = places["full"]
+    x = (whole.home - 0.5 * whole.deepest * whole.normal)[None]
+    few, full = (float(np.linalg.norm(places[name].energy.force(x))) for name in ("few", "full"))
+    return float(np.log(few / full))
+
+
 @pytest.mark.full
 @pytest.mark.timeout(900)
 def test_a_scripted_participant_compares_the_full_model_with_a_surrogate(bodies, chromium):
-    """Two people, who compare the stiffness that the page shows with the noise of a hand, feel both alike."""
+    """The page shows each pair as stiff as it is; people with such a hand, simulated, feel both alike."""
     folder, learnt, _ = bodies
     for name, body in learnt.items():
         body.save(folder / f"{name}.palpate")
@@ -71,28 +81,31 @@ def test_a_scripted_participant_compares_the_full_model_with_a_surrogate(bodies,
     text = ready_plan("full-model", "realism", ["full.palpate", "few.palpate"])
     text = shortened(text, TRIALS, catch=0).replace("interval_seconds = 0.3", "interval_seconds = 0.8")
     plan.write_text(text, "utf-8")
-    rng = np.random.default_rng(5)
+    seen = []
 
     def stiffer(felt: dict[int, float]) -> int:
-        noise = np.exp(NOISE * rng.standard_normal(2))
-        return 1 + int(felt.get(2, 0.0) * noise[1] > felt.get(1, 0.0) * noise[0])
+        seen.append(np.log(felt[2] / felt[1]))
+        return 1 + int(seen[-1] > 0.0)
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
-        for label in ("sub-01", "sub-02"):
-            sitting = Sitting(browser, plan, label=label)
-            sitting.act(TRIALS + 1, press=True, seconds=400.0, answer=stiffer)
-            assert sitting.end() == 0
+        sitting = Sitting(browser, plan)
+        sitting.act(LIVE, press=True, seconds=600.0, answer=stiffer)
+        sitting.end(kill=True)
         browser.close()
     study = StudyFolder.beside(plan)
-    for _, table in study.tables():
-        bodies_felt = {body for row in read_table(table) for body in row["intervals"].split(",")}
-        assert bodies_felt == {"reference", "body1"}
+    shift = force_ratio(learnt)
+    ((_, table),) = study.tables()
+    rows = read_table(table)
+    assert {row["intervals"] for row in rows} == {"reference,body1", "body1,reference"}
+    shown = [(float(r["level"]) + shift) * (1 if r["intervals"].endswith("body1") else -1) for r in rows]
+    assert seen == pytest.approx(shown, abs=0.05)  # the bar's steps, and depths that differ a little
+
+    for k in range(1, PEOPLE + 1):  # the first goes on where the kill was
+        run_through(study, f"{k:02d}", seed=k, shift=shift)
+    assert table.read_text("utf-8").count("\n") == 1 + 1 + TRIALS
     result = analyse(study)
     (group,) = result.groups
     assert group.same is not None
-    assert group.same.people == 2
-    assert "the same as the reference within 0.5 JND" in str(result)
-    for person in result.people:
-        low, _, high = person.location
-        assert low < 0.0 < high  # both feel alike: within 2 % of force, where a hand's noise is 7 %
+    assert group.same.people == PEOPLE
+    assert "the same as the reference within 0.5 JND: shown" in str(result)

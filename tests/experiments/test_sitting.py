@@ -130,14 +130,15 @@ def folder(tmp_path):
     return own
 
 
-def run_through(folder, label, count=10**6, seed=0, observer=None):
-    """Answer a sitting as a simulated person, and write its table."""
+def run_through(folder, label, count=10**6, seed=0, shift=0.0):
+    """Answer a sitting, or its rest, as a simulated person to whom the comparison is stiffer by `shift`."""
     who = Participant(label)
     folder.enrol(who)
     files = folder.sitting(who, 1)
     sitting, rng = Sitting(folder.plan, who.label), np.random.default_rng(seed)
+    sitting.restore(files.rows())
     while sitting.done < count and (trial := sitting.next()) is not None:
-        p = 0.01 + 0.98 / (1.0 + np.exp(-1.7 * trial.level / 0.2))
+        p = 0.01 + 0.98 / (1.0 + np.exp(-1.7 * (trial.level + shift) / 0.2))
         yes = rng.random() < p
         response = trial.target if yes else 3 - trial.target
         row = {"trial": trial.number, "kind": trial.kind, "condition": trial.condition, "part": 1}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import tomllib
 from types import SimpleNamespace
 
@@ -183,7 +184,23 @@ def test_a_jump_of_the_clock_is_noted_and_changes_no_time(stage):
     (row,) = read_table(stage.files.table)
     assert float(row["clock_jump"]) == pytest.approx(-3600.0, abs=0.1)
     assert 0.0 < float(row["duration"]) < 60.0
-    assert "jumped" in c.control_view()["said"]
+    assert "clock went back by 60 min; the" in c.control_view()["said"]
+
+
+def test_a_jump_of_the_clock_between_trials_is_noted_with_the_next_and_not_again(stage):
+    c = stage.c
+    c.hear({"agree": True})
+    for jump in (0.0, -7200.0, 0.0):
+        stage.clock.offset += jump
+        c.hear({"go": True})
+        stage.lead("question")
+        c.hear({"answer": 1})
+    rows = read_table(stage.files.table)
+    assert [float(row["clock_jump"]) for row in rows] == pytest.approx([0.0, -7200.0, 0.0], abs=0.1)
+    assert all(float(a["onset"]) < float(b["onset"]) for a, b in itertools.pairwise(rows))
+    again = Sitting(c.plan, "sub-01")
+    again.restore(list(rows))
+    assert again.done == 3
 
 
 def test_a_device_that_is_gone_ends_in_words(stage):

@@ -90,15 +90,17 @@ def _open(
     token: bool,
 ) -> None:
     """Serve the page of an examination until Ctrl-C."""
-    from palpate.experiments.exam_page import ExamPage, serve_exam
     from palpate.runtime.touchable import aim_device, touchable
     from palpate.runtime.warm_up import WarmUp
 
-    kind, surrogate = _body(what)
-    body = touchable(surrogate)
     hidden = [_lump(text) for text in lumps] or None
-    with WarmUp("pressed", "loop", body=body) as warm_up:
-        console.say(f"Opening the {kind.title[0].lower()}{kind.title[1:]} … {warm_up.words}".rstrip())
+    with WarmUp("pressed", "loop") as warm_up:  # it compiles while the page's parts and the body are loaded
+        from palpate.experiments.exam_page import ExamPage, serve_exam
+
+        kind, surrogate = _body(what)
+        body = touchable(surrogate)
+        words = warm_up.words or WarmUp(body=body).words
+        console.say(f"Opening the {kind.title[0].lower()}{kind.title[1:]} … {words}".rstrip())
         warm_up.wait()
     page = ExamPage(
         kind,

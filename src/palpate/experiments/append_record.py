@@ -20,8 +20,9 @@ from typing import Any, BinaryIO, Self
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.files import system_errors
+from palpate.format import duration
 
-__all__ = ["AppendRecord", "Clocks", "hold_file", "read_events"]
+__all__ = ["AppendRecord", "Clocks", "hold_file", "jump_in_words", "read_events"]
 
 JUMP = (
     2.0  # s by which wall and steady clock may disagree between two events: more is a jump of the wall clock
@@ -115,6 +116,11 @@ class AppendRecord:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def jump_in_words(seconds: float) -> str:
+    """Return a sentence, without its end, on a jump of the machine's clock."""
+    return f"The machine's clock went {'back' if seconds < 0 else 'forward'} by {duration(abs(seconds))}"
 
 
 def read_events(path: str | os.PathLike[str]) -> list[dict[str, Any]]:

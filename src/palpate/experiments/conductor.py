@@ -20,6 +20,7 @@ import numpy as np
 
 from palpate.devices import device_traits
 from palpate.errors import PalpateError, UsageError
+from palpate.experiments.append_record import jump_in_words
 from palpate.experiments.experiment_plan import Plan
 from palpate.experiments.sitting import Sitting, Trial
 from palpate.experiments.stimuli import Felt, Stimuli
@@ -57,7 +58,6 @@ class _Attempt:
 
     trial: Trial
     onset: float
-    wall: float
     interval: int = 1
     touches: list[_Touch] = field(default_factory=list)
     felt: list[Felt] = field(default_factory=list)  # the body of each interval
@@ -85,6 +85,7 @@ class Conductor:
         self.phase, self.words, self.said = "consent", "", ""
         self._lock = threading.RLock()
         self._start, self._until = clock(), 0.0
+        self._offset = wall() - clock()  # as it was when the last answer came
         self._attempt: _Attempt | None = None
         self._felt: Felt | None = None
         self._heard, self._hand, self._held, self._hidden = -np.inf, 0.0, False, False
@@ -257,7 +258,7 @@ class Conductor:
         if trial is None:
             self._finish("That was all. Thank you!")
             return
-        self._attempt = _Attempt(trial, self._clock() - self._start, self._wall() - self._clock())
+        self._attempt = _Attempt(trial, self._clock() - self._start)
         self._pause()
 
     def _pause(self) -> None:
@@ -337,7 +338,8 @@ class Conductor:
             return
         response = 1 if self._rates else answer
         trial, present = attempt.trial, self._clock()
-        jump = self._wall() - present - attempt.wall
+        offset = self._wall() - present
+        jump, self._offset = offset - self._offset, offset
         touches = attempt.touches
         correct = trial.is_correct(response)
         row: dict[str, Any] = {
@@ -362,7 +364,7 @@ class Conductor:
         }
         row |= dict(zip((r.name for r in self.plan.rating), ratings or [], strict=False))
         if abs(jump) > _JUMP:
-            self.said = f"The machine's clock jumped by {jump:.1f} s; the trial's times are not affected."
+            self.said = f"{jump_in_words(jump)}; the trials' times are not affected."
         self.files.append(row)
         self.sitting.answer(response)
         self._attempt = None

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Iterable
 
 import numpy as np
 
+from palpate.experiments.append_record import jump_in_words
 from palpate.experiments.exam_score import ExamScore, share_interval
 from palpate.experiments.exam_touch import LEVELS, search_path, typical_force
 from palpate.format import count, duration, millimetres
@@ -15,6 +17,8 @@ __all__ = ["map_of", "profile_of", "score_page"]
 
 _WIDE, _MARGIN = 560.0, 16.0  # of the pictures, in their own units
 _SHADES = ("#e6eaec", "#bcdcef", "#6fb0d8", "#1f6f9b")  # not pressed, and each of the levels
+_UNIT = re.compile(r"(\d|⌀) (?=\d|(mm|cm|N|%|min|ms|s)\b|%)")  # a number and its unit stay on one line
+_NEAR = 50.0  # of the map's units: marks whose numbers could meet
 _MOST_BARS = 400  # of the force profile: more would not be seen
 
 _STYLE = """
@@ -23,15 +27,17 @@ _STYLE = """
   :root { --ink: #e8edf0; --soft: #9aaab5; --line: #2b363f; --ground: #12181d; --paper: #1a2229; }
 }
 body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--ground); margin: 0 auto;
-  max-width: 900px; padding: 20px 16px 48px; }
+  max-width: 640px; padding: 20px 16px 48px; }
 h1 { font-size: 24px; margin: 0 0 4px; } h2 { font-size: 17px; margin: 28px 0 8px; }
 .soft { color: var(--soft); } .line { font-size: 19px; margin: 12px 0; }
-svg { width: 100%; max-width: 560px; height: auto; background: #fff; border: 1px solid var(--line); }
-table { border-collapse: collapse; width: 100%; max-width: 640px; } td, th { text-align: left; padding: 5px 10px 5px 0;
+svg { width: 100%; height: auto; background: #fff; border: 1px solid var(--line); }
+table { border-collapse: collapse; width: 100%; } td, th { text-align: left; padding: 5px 10px 5px 0;
   border-bottom: 1px solid var(--line); font-variant-numeric: tabular-nums; }
 th { font-weight: 600; color: var(--soft); }
 .good { color: #2c7a4b; } .bad { color: #c8452a; }
-.key i { display: inline-block; width: 14px; height: 14px; margin: 0 5px -2px 12px; border: 1px solid #0002; }
+.key span { display: inline-block; margin-right: 12px; }
+.key i { display: inline-block; width: 14px; height: 14px; margin: 0 5px -2px 0; border: 1px solid #0002; }
+svg .mark { paint-order: stroke; stroke: #fff; stroke-width: 4px; }
 """
 
 
@@ -77,11 +83,9 @@ def _notes(score: ExamScore) -> list[str]:
         notes.append(
             "The lumps of this body are schematic: their strength comes from a formula, not from solves."
         )
-    for jump in score.past.jumps:
-        way = "back" if jump < 0 else "forward"
-        notes.append(
-            f"The machine's clock went {way} by {duration(abs(jump))} meanwhile; times here are of one that doesn't."
-        )
+    notes += [
+        f"{jump_in_words(jump)} meanwhile; times here are of one that doesn't." for jump in score.past.jumps
+    ]
     breaks = sum(event["kind"] == "resumed" for event in score.past.events)
     if breaks:
         notes.append(f"It was interrupted {count(breaks, 'time')}; the time of the breaks is not counted.")
@@ -91,7 +95,7 @@ def _notes(score: ExamScore) -> list[str]:
 def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     top = "".join(f"<th>{cell}</th>" for cell in head)
     body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
-    return f"<table><tr>{top}</tr>{body}</table>"
+    return _UNIT.sub("\\1&nbsp;", f"<table><tr>{top}</tr>{body}</table>")
 
 
 def _lump_table(score: ExamScore) -> str:
@@ -158,7 +162,8 @@ def _pressing(score: ExamScore) -> str:
 def _key() -> str:
     names = ["not pressed", *LEVELS]
     shades = "".join(
-        f'<i style="background:{shade}"></i>{name}' for shade, name in zip(_SHADES, names, strict=True)
+        f'<span><i style="background:{shade}"></i>{name}</span>'
+        for shade, name in zip(_SHADES, names, strict=True)
     )
     return (
         f'<p class="soft key">{shades}<br>Circles: lumps, green where found, red where missed. Crosses with numbers: '
@@ -192,13 +197,28 @@ def map_of(score: ExamScore) -> str:
         drawn.append(
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}" fill="{colour}33" stroke="{colour}" stroke-width="2.5"/>'
         )
-    for mark in score.marks:
-        x, y = place(np.array(mark.place) @ surface.axes.T)[0]
-        drawn.append(
-            f'<path d="M{x - 6:.1f} {y - 6:.1f}l12 12m-12 0l12 -12" stroke="#1d2730" stroke-width="2.5"/>'
-            f'<text x="{x + 9:.1f}" y="{y + 5:.1f}" font-size="15" font-weight="700">{mark.number}</text>'
-        )
+    drawn += _crosses(
+        [(mark.number, *place(np.array(mark.place) @ surface.axes.T)[0]) for mark in score.marks]
+    )
     return "".join([*drawn, "</svg>"])
+
+
+def _crosses(marks: list[tuple[int, float, float]]) -> list[str]:
+    """Return marks as crosses, each with its number on the side that is away from the nearest other mark."""
+    drawn = []
+    for number, x, y in marks:
+        others = [(np.hypot(a - x, b - y), a) for other, a, b in marks if other != number]
+        side = -1 if others and min(others) < (_NEAR, 0.0) and min(others)[1] > x else 1
+        cross = f"M{x - 6:.1f} {y - 6:.1f}l12 12m-12 0l12 -12"
+        drawn += [
+            f'<path d="{cross}" stroke="{ink}" stroke-width="{wide}"/>'
+            for ink, wide in (("#fff", 6), ("#1d2730", 2.5))
+        ]
+        drawn.append(
+            f'<text class="mark" x="{x + 10 * side:.1f}" y="{y + 7:.1f}" font-size="19" font-weight="700" '
+            f'text-anchor="{"start" if side > 0 else "end"}">{number}</text>'
+        )
+    return drawn
 
 
 def _shade(at: np.ndarray, triangles: np.ndarray, shares: np.ndarray) -> list[str]:
@@ -242,7 +262,7 @@ def profile_of(score: ExamScore) -> str:
     return (
         f'<svg viewBox="0 0 {_WIDE:.0f} {tall:.0f}" role="img" aria-label="Force over time">'
         f'<polyline points="{points}" fill="none" stroke="#1f6f9b" stroke-width="1.3"/>'
-        f'<text x="{_MARGIN}" y="12" font-size="12" fill="#5d6b76">{most:.2f} N</text>'
-        f'<text x="{_WIDE - _MARGIN}" y="{tall - 2}" font-size="12" fill="#5d6b76" text-anchor="end">'
+        f'<text x="{_MARGIN}" y="14" font-size="16" fill="#5d6b76">{most:.2f} N</text>'
+        f'<text x="{_WIDE - _MARGIN}" y="{tall - 2}" font-size="16" fill="#5d6b76" text-anchor="end">'
         f"{duration(end)}</text></svg>"
     )

@@ -64,7 +64,7 @@ COLUMNS: dict[str, dict[str, Any]] = {
     "peak_depth": {"Description": "Largest depth in each interval", "Units": "m"},
     "limits_hit": {"Description": "1 where the limit of force acted in the trial"},
     "clock_jump": {
-        "Description": "Jump of the machine's clock during the trial; times don't use it",
+        "Description": "Jump of the machine's clock since the answer before; times don't use it",
         "Units": "s",
     },
     "recordings": {"Description": "Files with every tick of each interval, beside this table"},

@@ -112,11 +112,13 @@ def _from_first_version(content: dict[str, Any]) -> dict[str, Any]:
 def _beside(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
     """Return the content of a file with the files that it names as paths that start from where the program runs."""
     acting, body = content.get("interaction"), content.get("body")
-    for key in ("shape", "jaw", "other") if isinstance(acting, dict) else ():
-        shape = acting.get(key)
-        if isinstance(shape, dict) and isinstance(shape.get("file"), str):
-            acting = acting | {key: shape | {"file": str(folder / shape["file"])}}
-            content = content | {"interaction": acting}
+    if isinstance(acting, dict):
+        shapes = {
+            key: shape | {"file": str(folder / shape["file"])}
+            for key in ("shape", "jaw", "other")
+            if isinstance(shape := acting.get(key), dict) and isinstance(shape.get("file"), str)
+        }
+        content = content | {"interaction": acting | shapes}
     if not isinstance(body, dict):
         return content
     body = _with_modules(folder, body)

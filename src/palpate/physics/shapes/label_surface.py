@@ -24,8 +24,9 @@ __all__ = ["LabelSurface", "label_surface"]
 SMOOTH_VOXEL, SMOOTH_LATTICE = 0.85, 0.35
 EVEN, EXACT = 8, 4  # rounds that spread the vertices and step back to the surface, and of these steps alone
 WITHIN = 0.45  # of the lattice's spacing: a vertex stays in its cube, so that surfaces don't cut each other
-FAIR = 2.0  # voxels: waves of 2π times this length are halved where terraces are removed
+FAIR = 3.0  # voxels: waves of 2π times this length are halved where terraces are removed
 STEEP = 3.0  # largest cotangent of a triangle's angle: slivers would else hold their corners
+HELD = 1e6  # lattice squares: what a move of a place that is held weighs
 LEAST_SHARE = 0.05  # of a lattice square: least area around a vertex, against slivers
 SHIFTS, MOST_SHIFT = (
     6,
@@ -209,24 +210,86 @@ def _settle(
             places = np.clip(places, centres - WITHIN, centres + WITHIN)
     voxel = float(np.prod(lattice.image.spacing)) ** (1 / 3) / lattice.spacing
     reach = np.where(lattice.is_at_end(places), 0.0, TERRACE * voxel)  # a cut is flat up to its rim
-    bend, share = _curvature(places, _halve(places, quads), mean, is_joined & (count > 2))
 
     def keep_volumes(moved: np.ndarray) -> np.ndarray:
         return _with_volumes(moved, quads, sides, lattice.volumes)
 
-    return keep_volumes(_without_terraces(places, bend, share, FAIR * voxel, reach, keep_volumes))
+    swap = sides[:, 0] < sides[:, 1]  # all of a sheet between two labels is seen from one side
+    rings = np.where(swap[:, None], quads[:, ::-1], quads)
+    line = _line_bending(mean, is_joined & (count > 2))
+    return keep_volumes(_without_terraces(places, rings, line, FAIR * voxel, reach, keep_volumes))
 
 
-def _curvature(
-    places: np.ndarray, triangles: np.ndarray, mean: Any, is_seam: np.ndarray
-) -> tuple[Any, np.ndarray]:
-    """Return the matrix from places (n, 3) to twice a surface's mean curvature vectors, and the area (n,) of each.
+def _line_bending(mean: Any, is_seam: np.ndarray) -> Any:
+    """Return the matrix of second differences along lines where three tissues meet, with no rows but theirs."""
+    from scipy.sparse import diags_array, eye_array
 
-    It has the cotangents of the triangles (Pinkall and Polthier 1993): the mean over neighbours would see the cubes of
-    the lattice, too, and flatten what is round where it faces an axis. Along lines where three tissues meet it is the
-    second difference.
+    return diags_array(2.0 * is_seam) @ (eye_array(len(is_seam)) - mean)
+
+
+def _without_terraces(
+    places: np.ndarray,
+    rings: np.ndarray,
+    line: Any,
+    length: float,
+    reach: np.ndarray,
+    keep_volumes: Callable[[np.ndarray], np.ndarray],
+) -> np.ndarray:
+    """Return places (n, 3) on a surface without the steps of the voxels, smooth over a `length` of the lattice.
+
+    The surface is one of even curvature that stays near the places, each within its `reach` (n,), which is half a
+    voxel: a label says no more of where a surface is. A ball has even curvature, and stays as it is. Lines where three
+    tissues meet are smoothed first, and hold the sheets between them.
     """
-    from scipy.sparse import coo_matrix, diags_array, eye_array
+    from scipy.sparse import eye_array
+    from scipy.sparse.linalg import splu
+
+    is_seam = line.diagonal() > 0
+    along = splu((eye_array(len(places)) + length**4 * line.T @ line).tocsc()).solve
+    smooth = places
+    for _ in range(FAIR_ROUNDS):
+        moved = np.where(is_seam[:, None], along(smooth), smooth)
+        moved = moved + _even_moves(moved, rings, is_seam | (reach == 0), length)
+        away = keep_volumes(moved) - places
+        far = np.linalg.norm(away, axis=1, keepdims=True)
+        smooth = places + away * np.minimum(1.0, reach[:, None] / np.maximum(far, 1e-12))
+    return smooth
+
+
+def _even_moves(places: np.ndarray, rings: np.ndarray, is_held: np.ndarray, length: float) -> np.ndarray:
+    """Return moves (n, 3) along normals after which the mean curvature varies least, beside the squares of the moves.
+
+    Curvature has the cotangents of the triangles (Pinkall and Polthier 1993): a mean over neighbours would see the
+    cubes of the lattice, too, and flatten what is round where it faces an axis. Its variation, not its square, is
+    small: a terrace wider than a few voxels is seen beside the round surface around it.
+    """
+    from scipy.sparse import diags_array
+    from scipy.sparse.linalg import splu
+
+    normals = _normals(places, rings)
+    weights, share = _cotangents(places, _halve(places, rings))
+    free = diags_array(1.0 * ~is_held)
+    bend = free @ diags_array(1 / share) @ _laplacian(weights)
+    # a surface that moves by u along its normal changes its curvature by -Δu less the squares of the principal ones
+    normal_bend = bend - diags_array(np.einsum("ni,ni->n", normals, bend @ normals))
+    uneven = length**6 * normal_bend.T @ _laplacian(free @ weights @ free)
+    curvature = np.einsum("ni,ni->n", normals, bend @ places)
+    system = diags_array(share + HELD * is_held) + uneven @ normal_bend
+    return np.asarray(-splu(system.tocsc()).solve(uneven @ curvature)[:, None] * normals)
+
+
+def _normals(places: np.ndarray, rings: np.ndarray) -> np.ndarray:
+    """Return unit normals (n, 3) at places, from the quadrilaterals (q, 4) around them."""
+    a, b, c, d = (places[k] for k in rings.T)
+    area, total = np.cross(c - a, d - b) / 2, np.zeros_like(places)
+    for corner in rings.T:
+        np.add.at(total, corner, area)
+    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))
+
+
+def _cotangents(places: np.ndarray, triangles: np.ndarray) -> tuple[Any, np.ndarray]:
+    """Return the matrix of half the cotangents opposite each edge, and the area (n,) around each place."""
+    from scipy.sparse import coo_matrix
 
     count = len(places)
     weights: Any = 0.0
@@ -238,36 +301,14 @@ def _curvature(
         half = coo_matrix((cotangent / 2, (i, j)), shape=(count, count)).tocsr()
         weights = weights + half + half.T
     share = np.bincount(triangles.ravel(), weights=np.repeat(area / 6, 3), minlength=count)
-    share = np.maximum(share, LEAST_SHARE)
-    sheet = diags_array(~is_seam / share) @ (diags_array(np.asarray(weights.sum(axis=1)).ravel()) - weights)
-    return sheet + diags_array(2.0 * is_seam) @ (eye_array(count) - mean), share
+    return weights, np.maximum(share, LEAST_SHARE)
 
 
-def _without_terraces(
-    places: np.ndarray,
-    bend: Any,
-    share: np.ndarray,
-    length: float,
-    reach: np.ndarray,
-    keep_volumes: Callable[[np.ndarray], np.ndarray],
-) -> np.ndarray:
-    """Return places (n, 3) on a surface without the steps of the voxels, smooth over a `length` of the lattice.
-
-    The surface is the one of least bending that stays near the places, each within its `reach` (n,), which is half a
-    voxel: a label says no more of where a surface is. Bending, the square of the curvature, leaves what is round as it
-    is but for its volume.
-    """
+def _laplacian(weights: Any) -> Any:
+    """Return the matrix of sums of weighted differences from neighbours."""
     from scipy.sparse import diags_array
-    from scipy.sparse.linalg import splu
 
-    area = diags_array(share)
-    solve = splu((area + length**4 * bend.T @ area @ bend).tocsc()).solve
-    smooth = places
-    for _ in range(FAIR_ROUNDS):
-        away = keep_volumes(solve(area @ smooth)) - places
-        far = np.linalg.norm(away, axis=1, keepdims=True)
-        smooth = places + away * np.minimum(1.0, reach[:, None] / np.maximum(far, 1e-12))
-    return smooth
+    return diags_array(np.asarray(weights.sum(axis=1)).ravel()) - weights
 
 
 def _with_volumes(
@@ -277,16 +318,20 @@ def _with_volumes(
 
     The quadrilaterals (q, 4) have the labels (q, 2) on their sides; volumes are in cubes of the lattice.
     """
+    count = len(volumes) + 1
     for _ in range(SHIFTS):
         a, b, c, d = (places[k] for k in quads.T)
         area = np.cross(c - a, d - b) / 2  # towards the second side
-        flow = np.einsum("qi,qi->q", area, (a + b + c + d) / 4) / 3  # divergence theorem
+        u, v, w = np.moveaxis(places[_halve(places, quads)], 1, 0)
+        flow = np.einsum("ti,ti->t", np.cross(u, v), w).reshape(-1, 2).sum(axis=1) / 6  # divergence theorem
         size = np.linalg.norm(area, axis=1)
-        shift = np.zeros(len(volumes) + 1)
-        for number, wanted in enumerate(volumes, 1):
-            one, other = sides[:, 0] == number, sides[:, 1] == number
-            missing = wanted - flow[one].sum() + flow[other].sum()
-            shift[number] = missing / max(size[one | other].sum(), 1e-9)
+        gained = np.bincount(sides[:, 0], flow, count) - np.bincount(sides[:, 1], flow, count)
+        contact = np.zeros((count, count))
+        np.add.at(contact, tuple(sides.T), size)
+        contact += contact.T
+        # a label grows by its areas times its shift, less those of its neighbours
+        growth = (np.diag(contact.sum(axis=1)) - contact)[1:, 1:]
+        shift = np.append(0.0, np.linalg.lstsq(growth, np.asarray(volumes) - gained[1:], rcond=1e-9)[0])
         move, weight = np.zeros_like(places), np.zeros(len(places))
         push = area * np.clip(shift[sides[:, 0]] - shift[sides[:, 1]], -MOST_SHIFT, MOST_SHIFT)[:, None]
         for corner in quads.T:

@@ -34,9 +34,11 @@ def finer_problem(problem: Any, places: np.ndarray) -> Any:
     base = getattr(problem, "base", problem)
     pressing = next(part for part in base.interactions if isinstance(part, PressingTool | Pinch))
     X = np.asarray(places, dtype=float)
-    probe, sites = pressing, X[:, :3]
+    probe: PressingTool
     if isinstance(pressing, Pinch):  # both jaws press
         probe, sites = max(pressing.tools, key=_reach), np.concatenate(pressing.gripper.places(X))
+    else:
+        probe, sites = pressing, X[:, :3]
     wide = base.refinements
     size = FINER * min(part.element for part in wide if part.surface in {probe.meets, probe.touches})
     half = REACH * _reach(probe)

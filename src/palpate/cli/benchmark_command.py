@@ -16,6 +16,7 @@ from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.number_options import count_option
 from palpate.errors import UsageError
+from palpate.files import write_file
 
 __all__ = ["benchmark_app", "soft_touch"]
 
@@ -55,6 +56,8 @@ def soft_touch(
     from palpate.output_files import require_outputs
 
     require_outputs([path for path in (json_file, plot) if path is not None], overwrite=True)
+    if plot is not None and plot.suffix.lower() not in {".svg", ".png"}:
+        raise UsageError(f"{plot} is no picture's name.", fix="Write to NAME.svg or NAME.png.")
     folder = _folder()
     judging, standing = _module(folder, "judge"), _module(folder, "standings")
     try:
@@ -63,8 +66,10 @@ def soft_touch(
         raise UsageError(error.what, why=error.why, fix=error.fix) from error
     Console().say(standing.standings_text(rows))
     if json_file is not None:
-        content = {"rows": rows, "sweep": standing.sweep_rows(), "sources": standing.sources()}
-        json_file.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", "utf-8")
+        plain = {"rows": rows, "sweep": standing.sweep_rows()}
+        content = {key: [judging.plain_figures(row) for row in part] for key, part in plain.items()}
+        content["sources"] = standing.sources()
+        write_file(json_file, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     if plot is not None:
         standing.draw(rows, plot)
 
@@ -111,18 +116,29 @@ def _rows(
     if seed is None:
         own = _figures(judging, file, {name: judging.read_case(name) for name in cases}) if file else {}
         return list(standing.standings(cases, own))
+    learnt = [name for name in cases if any((_folder() / "learnt").glob(f"{name}-*.palpate"))]
+    missing = [name for name in cases if name not in learnt]
+    if file is None and missing:
+        raise UsageError(
+            f"No method can be asked anew on {', '.join(missing)}.",
+            why="palpate's surrogate is not learnt there, and --judge names no other method.",
+            fix="Take other bodies by --case, name a method by --judge, or learn the body: "
+            f"python -m benchmarks.soft_touch.learn_bodies --case {missing[0]}.",
+        )
     with tempfile.TemporaryDirectory() as scratch:
         make_places = _module(_folder(), "make_cases").make_places
         for name in cases:
             make_places(name, seed, Path(scratch) / name)
         read = {name: judging.read_case(name, Path(scratch)) for name in cases}
-        learnt = _folder() / "methods" / "palpate_surrogate.py"
-        figures = {"palpate's surrogate": _figures(judging, learnt, read)["palpate_surrogate.py"]}
+        own = _folder() / "methods" / "palpate_surrogate.py"
+        of_learnt = {name: read[name] for name in learnt}
+        figures = {"palpate's surrogate": _figures(judging, own, of_learnt)["palpate_surrogate.py"]}
         figures |= _figures(judging, file, read) if file else {}
     return [
         {"case": name, "method": title, "settings": f"places of seed {seed}", **of_cases[name]}
         for name in cases
         for title, of_cases in figures.items()
+        if name in of_cases
     ]
 
 

@@ -331,7 +331,9 @@ def _with_volumes(
         contact += contact.T
         # a label grows by its areas times its shift, less those of its neighbours
         growth = (np.diag(contact.sum(axis=1)) - contact)[1:, 1:]
-        shift = np.append(0.0, np.linalg.lstsq(growth, np.asarray(volumes) - gained[1:], rcond=1e-9)[0])
+        shift: np.ndarray = np.append(
+            0.0, np.linalg.lstsq(growth, np.asarray(volumes) - gained[1:], rcond=1e-9)[0]
+        )
         move, weight = np.zeros_like(places), np.zeros(len(places))
         push = area * np.clip(shift[sides[:, 0]] - shift[sides[:, 1]], -MOST_SHIFT, MOST_SHIFT)[:, None]
         for corner in quads.T:

@@ -229,7 +229,7 @@ def test_the_monotone_cubic_is_exact_for_lines_and_never_overshoots():
     assert (np.diff(monotone_cubic(x, np.array([0.0, 0.1, 5.0, 5.1]), at)) >= 0.0).all()
 
 
-def test_a_delay_between_samples_is_told():
+def test_a_delay_between_samples_is_measured():
     t = np.arange(600.0)
     pulse = lambda late: np.exp(-(((t - 300.0 - late) / 60.0) ** 2))  # noqa: E731
     assert delay(pulse(4.4), pulse(0.0)) == pytest.approx(4.4e-3, abs=2e-5)

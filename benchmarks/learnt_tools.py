@@ -239,11 +239,11 @@ def table(rows: dict[str, dict[str, Any]]) -> Table:
 
 
 def _with_others(measured: Record) -> Record:
-    """Return a record with the rows and claims that the one on disk has of cases not measured now."""
+    """Return a record with the rows and claims that the one on disk has of present cases not measured now."""
     old, words = Record.read("learnt_tools"), [case.words for case in CASES.values()]
-    fresh = {row[0] for row in measured.rows}
-    rows = [*measured.rows, *(row for row in old.rows if row[0] not in fresh)]
-    kept = [claim for claim in old.claims if not any(f": {name}: " in claim for name in fresh)]
+    others = set(words) - {row[0] for row in measured.rows}
+    rows = [*measured.rows, *(row for row in old.rows if row[0] in others)]
+    kept = [claim for claim in old.claims if any(f": {name}: " in claim for name in others)]
     rows.sort(key=lambda row: words.index(row[0]))
     return replace(measured, rows=tuple(rows), claims=(*measured.claims, *kept))
 

@@ -25,12 +25,13 @@ from benchmarks.machine import machine_line
 from benchmarks.soft_touch.case_files import CASES, Case, case_names, read_case
 from benchmarks.soft_touch.judge import question
 from benchmarks.soft_touch.standings import ANSWERS, METHODS, best_row
+from palpate.files import write_file
 
 __all__ = ["ask", "sweep"]
 
 SWEPT_PATHS = 2
 PACKAGES = {"mujoco_flex": ("mujoco",), "newton_vbd": ("newton", "warp-lang"), "force_rbf": ("scipy",)}
-FIGURES = 6  # significant, of numbers that are kept
+DIGITS = 6  # significant, of numbers that are kept
 
 
 def sweep(
@@ -73,7 +74,7 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, list):
         return [_rounded(entry) for entry in value]
     if isinstance(value, float):
-        return float(f"{value:.{FIGURES}g}") if np.isfinite(value) else None
+        return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
     return value
 
 
@@ -94,7 +95,8 @@ def ask(name: str, case: str, kept: dict[str, Any], options: argparse.Namespace)
     whole = read_case(case)
     setting, asked = best_row(kept["sweep"], whole)["setting"], _first_paths(whole, options.paths)
     before = kept.get("best", {})
-    if before.get("setting") != setting or before["press"] != asked.presses:
+    fresh = before.get("setting") == setting and before["press"] == asked.presses
+    if not fresh or (options.loops and "loop_work" not in before):
         answers = question(load(name, whole, setting), asked, loops=options.loops)
         kept["best"] = {"setting": setting, **answers}
         yield kept
@@ -125,7 +127,7 @@ def main(arguments: list[str] | None = None) -> int:
                     kept |= {"versions": _versions(name), "machine": machine_line()}
                     path.parent.mkdir(exist_ok=True)
                     text = json.dumps(kept, separators=(",", ":"), ensure_ascii=False)
-                    path.write_text(text.replace('{"setting"', '\n{"setting"') + "\n", "utf-8")
+                    write_file(path, text.replace('{"setting"', '\n{"setting"') + "\n")
                     if time.monotonic() - begin > 60.0 * options.minutes:
                         return 0
             except ImportError as error:

@@ -18,6 +18,7 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ __all__ = [
     "delay",
     "figure_text",
     "judge",
+    "plain_figures",
     "read_case",
     "read_method",
     "table_text",
@@ -62,8 +64,8 @@ STROKE_DEPTH = 0.95  # of the deepest press, so that the oracle is never extrapo
 PROBE_STEP = 0.05  # of the depth: central differences of d^1.5 then err by 0.01 %
 WEBER, WEBER_SMALL, SMALL = 0.07, 0.10, 1.0  # just noticeable share of a force; below 1 N
 LATEST = 0.1  # s, the longest delay that is looked for
-TIMED = 200  # single forces that are timed, or for so long:
-TIMED_SECONDS = 1.0  # s
+NO_ANSWER = "no answer"  # in words and in JSON, which has no infinity
+ROUNDING = 1e-9  # of a figure in any unit: less is printed as 0
 
 
 class _Table:
@@ -103,7 +105,7 @@ class _Fmu:
             )
 
     def force(self, places: np.ndarray) -> np.ndarray:
-        """Return forces (n, 3), a communication step of 1 ms for each place."""
+        """Return forces (n, 3) at the ends of communication steps of 1 ms, one at each place."""
         times = STEP * np.arange(len(places) + 1)
         fed = np.concatenate([places, places[-1:]])
         signal = np.array(
@@ -119,9 +121,11 @@ class _Fmu:
             output=["fx", "fy", "fz"],
             fmi_type="CoSimulation",
         )
-        return np.stack([np.asarray(answer[name], dtype=float) for name in ("fx", "fy", "fz")], 1)[
-            : len(places)
-        ]
+        forces = np.stack([np.asarray(answer[name], dtype=float) for name in ("fx", "fy", "fz")], 1)
+        # the first row is that of the start: an input counts from the beginning of a step, its output at the end
+        return forces[1:]
+
+    stroke = force
 
 
 def read_method(path: Path, case: Case) -> Any:
@@ -174,7 +178,8 @@ def question(method: Any, case: Case, *, loops: bool = True) -> dict[str, Any]:
     ----------
     method : object or callable
         Has `force(places (n, 3)) -> (n, 3)`, m and N, or is that function; or has the array `at_presses` (n, 3) alone.
-        May have `start(place)` and `step(place, seconds) -> (3,)`, and the numbers `solves` and `seconds_step`.
+        May have `start(place)` and `step(place, seconds) -> (3,)`, or `stroke(places (n, 3)) -> (n, 3)`, a place each
+        millisecond from rest, and the numbers `solves` and `seconds_step`.
     case : Case
     loops : bool
         Whether to ask for closed paths and for strokes, which take many steps.
@@ -223,22 +228,21 @@ def compare(answers: dict[str, Any], case: Case) -> dict[str, float | None]:
 
 def _asker(method: Any) -> Callable[[np.ndarray], np.ndarray] | None:
     call = getattr(method, "force", None) or (method if callable(method) else None)
-    if call is None:
-        return None
+    return None if call is None else partial(_ask, call)
 
-    def ask(places: np.ndarray) -> np.ndarray:
-        try:
-            forces = np.asarray(call(places.copy()), dtype=float)
-        except Exception as error:  # a stranger's method may raise anything
-            raise JudgeError("The method raised an error.", why=f"{type(error).__name__}: {error}") from error
-        if forces.shape != places.shape:
-            raise JudgeError(
-                f"The method answered {places.shape[0]} places by an array of shape {forces.shape}.",
-                fix=f"Return forces of shape {places.shape}, N.",
-            )
-        return forces
 
-    return ask
+def _ask(call: Callable[..., Any], places: np.ndarray, *rest: float) -> np.ndarray:
+    """Return the forces of a stranger's function at places (n, 3) or at one (3,), in the same shape."""
+    try:
+        forces = np.asarray(call(places.copy(), *rest), dtype=float)
+    except Exception as error:  # a stranger's method may raise anything
+        raise JudgeError("The method raised an error.", why=f"{type(error).__name__}: {error}") from error
+    if forces.shape != places.shape:
+        raise JudgeError(
+            f"The method answered places of shape {places.shape} by an array of shape {forces.shape}.",
+            fix="Return a force in N for each place, in the same shape.",
+        )
+    return forces
 
 
 def _force_figures(forces: np.ndarray, case: Case) -> dict[str, float | None]:
@@ -301,18 +305,35 @@ def _stroke_figures(
     late, times = [], list[float]()
     for path in (case.paths.min(), case.paths.max()):
         places, normal, expected = _stroke(case, int(path))
-        step = getattr(method, "step", None)
-        if step is not None:
-            method.start(places[0])
-        forces = np.empty_like(places)
-        for i, place in enumerate(places):
-            begin = time.perf_counter()
-            forces[i] = step(place.copy(), STEP) if step is not None else ask(place[None])[0]
-            times.append(time.perf_counter() - begin)
+        forces, seconds = _stroke_forces(method, ask, places)
+        times.append(seconds)
         felt = forces @ normal
         if np.isfinite(felt).all() and np.ptp(felt) > 0.0:
             late.append(1e3 * delay(felt, expected))
     return (float(np.median(late)) if late else None), float(np.median(times))
+
+
+def _stroke_forces(
+    method: Any, ask: Callable[[np.ndarray], np.ndarray], places: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Return the forces (n, 3) of a stroke, place by place unless the method takes all, and the seconds of one."""
+    begin = time.perf_counter()
+    if hasattr(method, "stroke"):
+        return _ask(method.stroke, places), (time.perf_counter() - begin) / len(places)
+    step = getattr(method, "step", None)
+    if step is not None:
+        try:
+            method.start(places[0].copy())
+        except Exception as error:  # a stranger's method may raise anything
+            raise JudgeError(
+                "start(place) raised an error.", why=f"{type(error).__name__}: {error}"
+            ) from error
+    forces, times = np.empty_like(places), []
+    for i, place in enumerate(places):
+        begin = time.perf_counter()
+        forces[i] = ask(place[None])[0] if step is None else _ask(step, place, STEP)
+        times.append(time.perf_counter() - begin)
+    return forces, float(np.median(times))
 
 
 def _stroke(case: Case, path: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -328,7 +349,7 @@ def _stroke(case: Case, path: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return places, normal, monotone_cubic(knots, force, depth)
 
 
-def monotone_cubic(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
+def monotone_cubic(x: np.ndarray, y: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return y at places by the monotone cubic of Fritsch and Butland (1984) through points, without overshoot."""
     h, slope = np.diff(x), np.diff(y) / np.diff(x)
     tangent = np.concatenate([slope[:1], np.zeros(len(x) - 2), slope[-1:]])
@@ -337,8 +358,8 @@ def monotone_cubic(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = (left + right) / (left / slope[:-1] + right / slope[1:])
     tangent[1:-1] = np.where(rising, mean, 0.0)
-    i = np.clip(np.searchsorted(x, at) - 1, 0, len(h) - 1)
-    s = (at - x[i]) / h[i]
+    i = np.clip(np.searchsorted(x, places) - 1, 0, len(h) - 1)
+    s = (places - x[i]) / h[i]
     low = y[i] + h[i] * tangent[i] * s + (3.0 * slope[i] - 2.0 * tangent[i] - tangent[i + 1]) * h[i] * s**2
     return np.asarray(low + (tangent[i] + tangent[i + 1] - 2.0 * slope[i]) * h[i] * s**3)
 
@@ -377,7 +398,17 @@ def figure_text(value: float | None) -> str:
     """Return a figure with three digits, or in words."""
     if value is None:
         return "not given"
-    return "no answer" if math.isinf(value) else f"{value:.3g}"
+    if math.isinf(value):
+        return NO_ANSWER
+    return f"{value if abs(value) > ROUNDING else 0.0:.3g}"
+
+
+def plain_figures(figures: dict[str, Any]) -> dict[str, Any]:
+    """Return figures as JSON has them, infinite ones in words."""
+    return {
+        key: NO_ANSWER if isinstance(value, float) and math.isinf(value) else value
+        for key, value in figures.items()
+    }
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -398,7 +429,8 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     print(table_text(results))
     if options.json:
-        options.json.write_text(json.dumps(results, indent=2) + "\n", "utf-8")
+        plain = {name: plain_figures(figures) for name, figures in results.items()}
+        options.json.write_text(json.dumps(plain, indent=2, allow_nan=False) + "\n", "utf-8")
     return 0
 
 

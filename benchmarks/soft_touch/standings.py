@@ -42,18 +42,18 @@ def standings(
     rows = []
     for name in cases:
         case = read_case(name, CASES)
-        found = []
+        own = []
         for method, title in METHODS.items():
             kept = _kept(method)["cases"].get(name)
             if kept is not None:
                 answers = kept.get("best") or best_row(kept["sweep"], case)
-                found.append(
+                own.append(
                     {"case": name, "method": title, "settings": answers["settings"], **compare(answers, case)}
                 )
         for title, figures in (further or {}).items():
             if name in figures:
-                found.append({"case": name, "method": title, "settings": "", **figures[name]})
-        rows += sorted(found, key=_error)
+                own.append({"case": name, "method": title, "settings": "", **figures[name]})
+        rows += sorted(own, key=_error)
     return rows
 
 

@@ -75,6 +75,7 @@ def test_standings_hold_the_rival_and_ones_own_method(half_space):
         (("--case", "sponge"), "The case is 'sponge'"),
         (("--judge", "nothing.py"), "There is no file nothing.py"),
         (("--plot", "standings.txt"), "does not end in .svg or .png"),
+        (("--seed", "3"), "No method can be asked anew on half-space"),
     ],
 )
 def test_bad_arguments_are_refused_in_words(half_space, words, says):

@@ -76,6 +76,10 @@ def test_what_is_no_pinch_is_refused_in_words():
         Pinch(CAPSULE, depth=(-0.001, 0.002))
     with pytest.raises(UsageError, match="not between the jaws"):
         body.problem(Pinch(CAPSULE, touches="x_max")).design(4)
+    with pytest.raises(UsageError, match="lines through the body, and 4 are wanted"):
+        body.problem(Pinch(CAPSULE, over=((0.01, 0.009), (1.0, 0.011)), depth=(0.0, 0.002))).design(
+            8, depths=2
+        )
     with pytest.raises(UsageError, match="all but meet"):
         body.problem(Pinch(CAPSULE, depth=(0.0, 0.009))).inputs(np.zeros(4))
     with pytest.raises(UsageError, match="pad"):

@@ -32,10 +32,7 @@ def pinched():
 def test_a_pinch_is_two_tools_that_press_together(pinched):
     """Energy, forces and stiffness are those of two tools on one body, with p = c ± w/2 e and the chain rule."""
     problem, solution = pinched
-    first, last = (replace(tool, over=((0.009, 0.010), (0.011, 0.012))) for tool in PINCH.tools)
-    both = replace(
-        BODY.problem([replace(first, over=None), replace(last, over=None)]), fine=problem.refinements
-    )
+    both = replace(BODY.problem(list(PINCH.tools)), fine=problem.refinements)
     places = np.concatenate(PINCH.gripper.places(INPUTS))
     apart = both.open().solve(places)
     to_inputs = np.vstack(

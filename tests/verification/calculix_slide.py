@@ -11,9 +11,8 @@ from calculix_ball import KILO, MILLI, block, cap, contact, graded
 
 REACH, DEEP = 0.8, 0.8  # of the fine part over the ball's radius, along the surface and down
 PENALTY = 100.0  # stiffness of the penalty over E/R: larger ones do not converge once the contact slips
-STICK = (
-    0.1  # of what sticks over that of the penalty: it takes 13 % of the first sideways stiffness; 0.5 stalls
-)
+# stiffness of what sticks over that of the penalty: it takes 13 % of the first sideways stiffness; 0.5 stalls
+STICK = 0.1
 INCREMENT = 0.1  # mm of slide
 
 

@@ -16,12 +16,8 @@ from palpate.surrogates import Surrogate
 pytestmark = [pytest.mark.full, pytest.mark.timeout(180)]
 
 MU = 0.3
-ASIDE = (
-    1,
-    20,
-    40,
-    60,
-)  # px: the first sticks; several slip, because a busy machine takes hold anew in between
+# px: the first sticks; several slip, because a busy machine takes hold anew in between
+ASIDE = (1, 20, 40, 60)
 
 
 def test_a_dragged_tool_sticks_and_then_slips(visit_pressed: Callable[[Surrogate], Page]):

@@ -31,5 +31,10 @@ def settings_of(case: Any) -> list[dict[str, Any]]:
 
 def load(case: Any, solves: int | None = None) -> _Learnt:
     """Return the surrogate learnt from so many solves, by default from the most."""
-    count = settings_of(case)[-1]["solves"] if solves is None else solves
+    counts = [setting["solves"] for setting in settings_of(case)] if solves is None else [solves]
+    if not counts:
+        raise FileNotFoundError(
+            f"{LEARNT} has no surrogate of {case.name}. Learn it: python -m benchmarks.soft_touch.learn_bodies"
+        )
+    count = counts[-1]
     return _Learnt(LEARNT / f"{case.name}-{count}.palpate", count)

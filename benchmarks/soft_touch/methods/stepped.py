@@ -10,9 +10,7 @@ import numpy as np
 
 __all__ = ["NEAR", "Simulator", "SteppedBall", "free_triangles", "outward"]
 
-NEAR = (
-    0.3  # of the ball's radius: places that follow each other so closely are gone to, others are come to anew
-)
+NEAR = 0.3  # of the ball's radius: to a place so near the ball goes on, to others it comes from outside
 WAY_STEPS = 8  # steps of a way, in which the ball moves evenly
 STEADY = 5e-3  # relative change of the force over the last steps below which the ball is at rest
 LOOK = 6  # steps over which this change is taken

@@ -67,7 +67,9 @@ def soft_touch(
     if plot is not None:
         save_figure(plot, lambda: standing.draw(rows))
     sweep, sources = (standing.sweep_rows(), standing.sources()) if as_json else ([], {})
-    content = {"rows": rows, "sweep": sweep, "sources": sources}
+    # a figure that is not given is null in JSON
+    rows_plain, sweep_plain = ([judging.plain_figures(row) for row in part] for part in (rows, sweep))
+    content = {"rows": rows_plain, "sweep": sweep_plain, "sources": sources}
     Console(as_json).result(standing.standings_text(rows), content)
 
 
@@ -110,18 +112,29 @@ def _rows(
     if seed is None:
         own = _figures(judging, file, {name: judging.read_case(name) for name in cases}) if file else {}
         return list(standing.standings(cases, own))
+    learnt = [name for name in cases if any((_folder() / "learnt").glob(f"{name}-*.palpate"))]
+    missing = [name for name in cases if name not in learnt]
+    if file is None and missing:
+        raise UsageError(
+            f"No method can be asked anew on {', '.join(missing)}.",
+            why="palpate's surrogate is not learnt there, and --judge names no other method.",
+            fix="Take other bodies by --case, name a method by --judge, or learn the body: "
+            f"python -m benchmarks.soft_touch.learn_bodies --case {missing[0]}.",
+        )
     with tempfile.TemporaryDirectory() as scratch:
         make_places = _module(_folder(), "make_cases").make_places
         for name in cases:
             make_places(name, seed, Path(scratch) / name)
         read = {name: judging.read_case(name, Path(scratch)) for name in cases}
-        learnt = _folder() / "methods" / "palpate_surrogate.py"
-        figures = {"palpate's surrogate": _figures(judging, learnt, read)["palpate_surrogate.py"]}
+        surrogate = _folder() / "methods" / "palpate_surrogate.py"
+        of_learnt = {name: read[name] for name in learnt}
+        figures = {"palpate's surrogate": _figures(judging, surrogate, of_learnt)[surrogate.name]}
         figures |= _figures(judging, file, read) if file else {}
     return [
         {"case": name, "method": title, "settings": f"places of seed {seed}", **of_cases[name]}
         for name in cases
         for title, of_cases in figures.items()
+        if name in of_cases
     ]
 
 

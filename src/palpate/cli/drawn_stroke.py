@@ -13,6 +13,7 @@ from palpate.format import share
 from palpate.number_text import number_list
 from palpate.runtime.touchable import Touchable, touchable
 from palpate.surrogates import Surrogate, TouchedSurface
+from palpate.surrogates.baselines import require_one_tool
 from palpate.units import bounds, parse_quantity
 
 __all__ = ["reservations_about", "stroke_of"]
@@ -49,6 +50,7 @@ def stroke_of(body: Surrogate, steps: int, at: str | None = None, depth: float |
         low, high = bounds(shown.inputs)  # type: ignore[union-attr]  # it has a field of nodes; from no load to all
         return np.asarray(shares[:, None] * np.where(np.abs(high) >= np.abs(low), high, low))
     hand = touchable(body)
+    require_one_tool(hand.energy.baseline, "be drawn along a stroke")
 
     def stroke(place: np.ndarray | None, far: float) -> np.ndarray:
         if hand.surface is None:

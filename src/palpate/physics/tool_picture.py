@@ -19,7 +19,7 @@ def tool_surface(solution: Any) -> ToolMesh | None:
     tool, pose = getattr(solution, "tool", None), getattr(solution, "pose", None)
     if tool is None or pose is None:
         return None
-    meshes = [_placed(own, x) for own, x in tool.solids(pose)]
+    meshes = [_surface_at(own, x) for own, x in tool.solids(pose)]
     first = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     return ToolMesh(
         np.concatenate([mesh.points for mesh in meshes]),
@@ -28,7 +28,7 @@ def tool_surface(solution: Any) -> ToolMesh | None:
     )
 
 
-def _placed(tool: PosedTool, x: np.ndarray) -> ToolMesh:
+def _surface_at(tool: PosedTool, x: np.ndarray) -> ToolMesh:
     """Return the surface of one tool at its own inputs."""
     place, turn = tool.pose(x)
     mesh = tool_mesh(tool.shape)

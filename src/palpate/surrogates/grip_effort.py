@@ -15,7 +15,7 @@ from palpate.tools.gripper import OPENING
 __all__ = ["efforts"]
 
 STEP = 2e-6  # m
-WAYS = ((1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0))  # steps and weights of the difference, over 12
+WAYS = ((1, -8.0), (-1, 8.0), (2, 1.0), (-2, -1.0))  # steps and weights of minus the slope, over 12
 
 
 def efforts(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
@@ -23,11 +23,10 @@ def efforts(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
     names = [r.name for r in energy.inputs]
     if OPENING not in names:
         raise UsageError(
-            "This body tells no effort of jaws.",
+            "This body has no effort of jaws.",
             why=f"Its inputs are {', '.join(names)}; an effort belongs to an opening.",
             fix="Sweep under a pp.Pinch, and learn from that.",
         )
     rows, way = rows_of(X, energy.inputs, "learnt body"), np.zeros(len(names))
     way[names.index(OPENING)] = STEP
-    slope = sum(weight * energy.energy(rows + many * way) for many, weight in WAYS)
-    return np.asarray(-slope / (12 * STEP))
+    return np.asarray(sum(weight * energy.energy(rows + many * way) for many, weight in WAYS) / (12 * STEP))

@@ -17,9 +17,7 @@ from palpate.surrogates.energy import LearntEnergy
 
 __all__ = ["APART", "two_tool_forces"]
 
-APART = (
-    3.5  # distance of two tools over the larger contact's radius from which on they hardly feel each other
-)
+APART = 3.5  # least distance of two tools over the larger contact's radius: nearer, each feels the other
 
 
 def two_tool_forces(
@@ -28,6 +26,12 @@ def two_tool_forces(
     """Return the forces (N, 3) in N on each of two tools at inputs (N, n); pairs that are too near are refused."""
     require_one_tool(energy.baseline, "be pressed by two such tools")
     X = [rows_of(rows, energy.inputs, "learnt body") for rows in (first, second)]
+    if len(X[0]) != len(X[1]):
+        raise UsageError(
+            f"There are {len(X[0])} places of the first tool and {len(X[1])} of the second.",
+            why="Both press at once: each row of one belongs to the same row of the other.",
+            fix="Give as many rows of both.",
+        )
     if energy.baseline.holds:
         raise UsageError(
             "A body that is held can't be held at a second place.",
@@ -41,7 +45,7 @@ def two_tool_forces(
         raise UsageError(
             f"Two tools are {millimetres(float(distance[row]))} apart in row {row}.",
             why=f"Nearer than {APART} contact radii, {millimetres(float(least[row]))} here, each feels what the other "
-            "does to the body, and the learnt energy knows one tool alone: forces would be off by more than 3 %.",
+            "does to the body, and the learnt energy knows one tool alone: forces may be off by more than 3 %.",
             fix="Take places farther apart, or learn both tools together: body.problem([tool, tool]).",
         )
     return energy.force(X[0]), energy.force(X[1])
@@ -50,7 +54,7 @@ def two_tool_forces(
 def _contact_radii(energy: LearntEnergy, X: np.ndarray) -> np.ndarray:
     """Return half the width (N,) in m of each tool's cut at its depth; 0 where it does not touch."""
     depths = np.maximum(energy.depth(X), 0.0)
-    tool = getattr(energy.baseline, "posed_tool", None)
+    tool, own = getattr(energy.baseline, "posed_tool", None), energy.baseline.radius_input
     if tool is not None:
         return np.array([max(tool.shape.half_widths(float(s))) if s > 0 else 0.0 for s in depths])
-    return np.asarray(np.sqrt(2 * energy.baseline.radius * depths))
+    return np.asarray(np.sqrt(2 * (energy.baseline.radius if own is None else X[:, own]) * depths))

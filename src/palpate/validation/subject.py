@@ -236,11 +236,10 @@ def _refuse_radius(energy: LearntEnergy | None, data: Dataset | None) -> None:
     own = energy.baseline.radius
     acting = data.provenance.get("problem", {}).get("interactions", [])
     tool = getattr(energy.baseline, "posed_tool", None)
-    tools: list[PosedTool | Gripper] = [
-        PosedTool.of(a) for a in acting if isinstance(a, dict) and a.get("type") == "SurfaceTool"
-    ]
+    plain = [a for a in acting if isinstance(a, dict)]
+    tools: list[PosedTool | Gripper] = [PosedTool.of(a) for a in plain if a.get("type") == "SurfaceTool"]
     if isinstance(tool, Gripper):
-        tools = [replace(Gripper.of(a), trained=tool.trained) for a in acting if a.get("type") == "Pinch"]
+        tools = [replace(Gripper.of(a), trained=tool.trained) for a in plain if a.get("type") == "Pinch"]
     if any(one != tool for one in tools) or (tool is not None and not tools):
         raise UsageError(
             f"The solves were made with {tools[0] if tools else 'another probe'}, the surrogate with "

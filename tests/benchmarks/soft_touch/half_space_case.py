@@ -45,9 +45,9 @@ def write_case(folder, slope=SLOPE):
         "utf-8",
     )
     (folder / "mesh.vtu").write_text(MESH, "utf-8")
-    feet = np.repeat(np.random.default_rng(3).uniform(-0.01, 0.01, (4, 2)), 5, axis=0)
+    touched = np.repeat(np.random.default_rng(3).uniform(-0.01, 0.01, (4, 2)), 5, axis=0)
     depth = np.tile(np.linspace(0.001, 0.005, 5), 4)
-    places = np.column_stack([feet, RADIUS - depth])
+    places = np.column_stack([touched, RADIUS - depth])
     forces = force(places, slope)
     kn = 1.5 * (STIFF + slope * places[:, 0]) * np.sqrt(depth)
     head = "press path step x y z nx ny nz depth"
@@ -56,8 +56,8 @@ def write_case(folder, slope=SLOPE):
     ]
     write_rows(folder / "presses.csv", head, rows)
     head = "press fx fy fz kn energy force_error stiffness_error energy_error"
-    known = zip(forces, kn, energy(places, slope), strict=True)
-    write_rows(folder / "oracle.csv", head, [(i, *f, k, e, 0, 0, 0) for i, (f, k, e) in enumerate(known)])
+    values = zip(forces, kn, energy(places, slope), strict=True)
+    write_rows(folder / "oracle.csv", head, [(i, *f, k, e, 0, 0, 0) for i, (f, k, e) in enumerate(values)])
     rows = [(0, i, *place) for i, place in enumerate(loop())]
     write_rows(folder / "loops.csv", "loop index x y z", rows)
     return folder

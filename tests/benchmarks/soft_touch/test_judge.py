@@ -17,11 +17,15 @@ from benchmarks.soft_touch.judge import (
     delay,
     judge,
     monotone_cubic,
+    plain_figures,
     question,
     read_case,
     read_method,
 )
 from half_space_case import RADIUS, STIFF, force, loop, write_case, write_rows
+
+from exported_bodies import body
+from palpate.export import export_fmu
 
 FOLDER = Path(__file__).parents[3] / "benchmarks" / "soft_touch"
 
@@ -126,6 +130,50 @@ def test_a_table_gives_no_stiffness(case, tmp_path):
         read_method(table, case)
 
 
+def test_an_fmu_gives_the_force_of_each_place(case, tmp_path):
+    """Places that follow each other anyhow, each with its own force, and strokes without delay."""
+    block = body("contact")
+    export_fmu(block, tmp_path / "block.fmu", name="block", check=False)
+    method = read_method(tmp_path / "block.fmu", case)
+    places = np.random.default_rng(4).uniform([-0.004, -0.004, 0.008], [0.004, 0.004, 0.0095], (20, 3))
+    modulus = block.energy.inputs[3]  # the FMU starts in its middle
+    X = np.column_stack([places, np.full(len(places), (modulus.low + modulus.high) / 2)])
+    np.testing.assert_allclose(method.force(places), block.energy.force(X), rtol=1e-9, atol=1e-12)
+    answers = question(method, case)
+    assert len(answers["at_presses"]) == len(case.presses)
+    assert (
+        abs(answers["lateness"]) < 1.5
+    )  # ms: the block is no half-space; an FMU answers at the end of a step
+
+
+class _Failing:
+    """A simulator whose strokes fail."""
+
+    force = staticmethod(force)
+
+    def start(self, place):
+        raise RuntimeError("no body")
+
+    def step(self, place, seconds):
+        return np.zeros(2)
+
+
+def test_a_simulator_that_fails_in_a_stroke_is_named(case):
+    with pytest.raises(JudgeError, match="no body"):
+        judge(_Failing(), case)
+    short = _Failing()
+    short.start = lambda place: None
+    with pytest.raises(JudgeError, match=r"an array of shape \(2,\)"):
+        judge(short, case)
+
+
+def test_figures_in_json_are_valid_without_an_answer(case):
+    figures = judge(lambda places: np.full(places.shape, np.nan), case)
+    plain = json.loads(json.dumps(plain_figures(figures), allow_nan=False))
+    assert plain["force_median"] == "no answer"
+    assert plain["loop_work"] is None
+
+
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
@@ -181,7 +229,7 @@ def test_the_monotone_cubic_is_exact_for_lines_and_never_overshoots():
     assert (np.diff(monotone_cubic(x, np.array([0.0, 0.1, 5.0, 5.1]), at)) >= 0.0).all()
 
 
-def test_a_delay_between_samples_is_told():
+def test_a_delay_between_samples_is_measured():
     t = np.arange(600.0)
     pulse = lambda late: np.exp(-(((t - 300.0 - late) / 60.0) ** 2))  # noqa: E731
     assert delay(pulse(4.4), pulse(0.0)) == pytest.approx(4.4e-3, abs=2e-5)

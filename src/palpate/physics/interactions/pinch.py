@@ -23,20 +23,21 @@ from palpate.physics.shapes.naming import require_known
 from palpate.physics.stop import Stop, Verdict
 from palpate.tools import Gripper, Tool
 from palpate.tools.gripper import GRIP, OPENING
-from palpate.units import Range
+from palpate.units import Range, bounds
 
 if TYPE_CHECKING:
     from palpate.physics.shapes.shape import Geometry
 
 __all__ = ["Pinch"]
 
-LEAD = -0.1  # depth of the jaw that lags over that of the other, at least: below 0 it is not in touch yet
+LAG = -0.1  # least depth of the jaw that lags over that of the other: below 0 it is not in touch yet
 LINES = 9  # lines through the body along each axis, between whose ends the ranges are taken
 MARGIN = 1.3  # how far beyond its lines a jaw may touch, over its size
 INSET = 2.0  # distance of the lines from the surface's ends over the jaws' size, unless `over` is given
 SAME_LINE = 1e-3  # distance over the jaws' size within which two lines are one
 CROWDED = 0.8  # share of the body's thickness that both jaws together may press in
-FOUND = 20  # times as many lines as wanted that are tried for a body that does not fill its box
+TRIALS = 20  # lines that are tried for each one wanted: a body need not fill its box
+ROUNDING = 1e-12  # m, by which rounding may carry inputs out of their ranges
 
 
 @dataclass(frozen=True)
@@ -157,9 +158,8 @@ class Pinch(PlainInteraction):
         ends = self._ends(geometry, grid)[0]
         deepest, least = max(self.depth), min(self.depth)
         self._require_thickness(float(self._thickness(ends).min()), deepest)
-        depths = np.array([(least, LEAD * least), (LEAD * least, least), (deepest, deepest)])
-        lags = np.array([(deepest, LEAD * deepest), (LEAD * deepest, deepest)])
-        rows = np.concatenate([self._rows(ends, pair) for pair in np.concatenate([depths, lags])])
+        lags = [pair for depth in (least, deepest) for pair in ((depth, LAG * depth), (LAG * depth, depth))]
+        rows = self._rows(ends, np.array([(deepest, deepest), *lags]))
         low, high = rows.min(axis=0), rows.max(axis=0)
         names = (*GRIP, OPENING)
         return tuple(
@@ -170,22 +170,32 @@ class Pinch(PlainInteraction):
         """Return inputs (samples, 4) in series, in each of which the jaws close along one line.
 
         The lines and the ratio of both depths are a scrambled Sobol sequence; one jaw leads, and the other presses at
-        most as deep. `depths` is their number in a series, by default the fourth root of the samples.
+        most as deep. `depths` is their number in a series, by default the fourth root of the samples. Lines on which
+        inputs would leave their ranges, as at the rim of a curved body, are passed over.
         """
         from scipy.stats import qmc
 
         count = depths_per_series(samples, 4) if depths is None else depths
         wanted = -(-samples // count)
         unit = qmc.Sobol(4, scramble=True, rng=np.random.default_rng(seed)).random(
-            1 << int(np.ceil(np.log2(FOUND * wanted)))
+            1 << int(np.ceil(np.log2(TRIALS * wanted)))
         )
+        low, high = bounds(self.ranges(geometry))
         ends, hit = self._ends(geometry, unit[:, :2])
-        rows = []
-        for end, (ratio, shift) in zip(ends[:wanted], unit[hit][:wanted, 2:], strict=True):
-            lead, other = depth_series(self.depth, count, shift), LEAD + (1 - LEAD) * abs(2 * ratio - 1)
+        series: list[np.ndarray] = []
+        for end, (ratio, shift) in zip(ends, unit[hit][:, 2:], strict=True):
+            lead, other = depth_series(self.depth, count, shift), LAG + (1 - LAG) * abs(2 * ratio - 1)
             pair = np.stack([lead, other * lead], axis=1)
-            rows.append(self._rows(end[None], pair if ratio < 0.5 else pair[:, ::-1]))
-        return np.concatenate(rows)[:samples]
+            rows = self._rows(end[None], pair if ratio < 0.5 else pair[:, ::-1])
+            if ((rows >= low - ROUNDING) & (rows <= high + ROUNDING)).all():
+                series.append(rows)
+            if len(series) == wanted:
+                return np.concatenate(series)[:samples]
+        raise UsageError(
+            f"The jaws find {len(series)} lines through the body, and {wanted} are wanted.",
+            why=f"Of {len(unit)} lines in their box the others miss the body, or leave its ranges.",
+            fix="Give `over` a box of lines that the body fills, in m, or ask for fewer samples.",
+        )
 
     def chains(self, geometry: Geometry, points: np.ndarray) -> list[np.ndarray]:
         """Return rows of inputs (N, 4) in chains: those along one line, from wide to narrow."""

@@ -131,14 +131,14 @@ class PinchBaseline(PosedBaseline):
     def jaw_depths(self, X: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Return for each jaw s (N,) in m, −∂s/∂p (N, 3) and −∂²s/∂p² (N, 3, 3) by its place, at inputs X (N, 4)."""
         numbers, surface, *balls, _, scratch = self._arguments()
-        found = []
+        depths = []
         for places, own in zip(self.posed_tool.places(X), balls, strict=True):
             s, slope, bend = np.empty(len(X)), np.empty((len(X), 3)), np.empty((len(X), 3, 3))
             for_rows(depths_into, len(X))(
                 np.ascontiguousarray(places), s, slope, bend, numbers, surface, own, np.eye(3), scratch
             )
-            found.append((s, slope, bend))
-        return found
+            depths.append((s, slope, bend))
+        return depths
 
     def logarithm(
         self, X: np.ndarray, inputs: tuple[Range, ...]

@@ -16,8 +16,8 @@ from palpate.tools import Gripper, PosedTool
 
 __all__ = ["PosedContact"]
 
-CANCELLED = 0.5  # length of the mean normal below which balls press from opposite sides
-ORDER = 4.0  # m, that of `PosedBaseline`
+LEAST_NORMAL = 0.5  # length of the mean normal below which the normals of two jaws cancel
+ORDER = 4.0  # m of the mean, half that of `PosedBaseline`: learnt shapes of files go by it
 
 
 class PosedContact:
@@ -46,8 +46,8 @@ class PosedContact:
         weights /= weights.sum(axis=1, keepdims=True)
         feet = np.einsum("nb,nbi->ni", weights, centres - distance[..., None] * slope)
         normal = np.einsum("nb,nbi->ni", weights, slope)
-        # the normals of two jaws cancel: then the deepest ball's own
-        faces = np.linalg.norm(normal, axis=1, keepdims=True) > CANCELLED
-        normal = np.where(faces, normal, slope[np.arange(len(X)), depths.argmax(axis=1)])
+        if isinstance(self._tool, Gripper):  # where the normals of both jaws cancel, the deepest ball's own
+            faces = np.linalg.norm(normal, axis=1, keepdims=True) > LEAST_NORMAL
+            normal = np.where(faces, normal, slope[np.arange(len(X)), depths.argmax(axis=1)])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         return np.where(touches, size * total ** (1.0 / ORDER), depths.max(axis=1)), feet, normal

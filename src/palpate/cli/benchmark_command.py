@@ -67,7 +67,7 @@ def soft_touch(
     if plot is not None:
         save_figure(plot, lambda: standing.draw(rows))
     sweep, sources = (standing.sweep_rows(), standing.sources()) if as_json else ([], {})
-    # a figure that is not given is null in JSON
+    # JSON has no infinity: an error without an answer is in words
     rows_plain, sweep_plain = ([judging.plain_figures(row) for row in part] for part in (rows, sweep))
     content = {"rows": rows_plain, "sweep": sweep_plain, "sources": sources}
     Console(as_json).result(standing.standings_text(rows), content)

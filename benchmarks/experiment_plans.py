@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.special import expit
 
 from benchmarks.runner import main
 from benchmarks.table import Claim, Column, Table, quick_mark
@@ -30,9 +31,9 @@ from palpate.experiments import (
 )
 from palpate.experiments.psychometric import Estimate
 from palpate.experiments.ratings import cumulative_logit
-from palpate.experiments.simulation import simulate_people, simulate_raters
+from palpate.experiments.simulation import simulate_people
 
-__all__ = ["tables"]
+__all__ = ["simulate_raters", "tables"]
 
 SIGNED = Psychometric("signed")
 LEVELS = np.linspace(-0.6, 0.6, 25)
@@ -44,6 +45,7 @@ _SAVED = 0.7  # share of the trials of constant stimuli
 _GROUP = 12
 _RATED = 4  # ratings of each body by each rater
 _EFFECTS = (0.7, -0.8, 0.4)  # logits
+_CUTS = np.array([-3.0, -1.8, -0.8, 0.2, 1.2, 2.4])  # thresholds between ratings of simulated raters, logits
 
 
 def _courses() -> dict[str, tuple[Course, Observer]]:
@@ -156,6 +158,27 @@ def _equivalence(groups: int, quick: bool) -> Table:
     claims = [Claim("shown at the margin, %", (rows[0]["shown"],), 5.0 + round(chance, 1), ".1f")]
     title = f"Two one-sided tests at 5 %, margin half a JND, 80 adaptive trials{quick_mark(quick)}"
     return Table("experiment_equivalence", title, columns, rows, [] if quick else claims)
+
+
+def simulate_raters(
+    rng: np.random.Generator,
+    people: int,
+    ratings: int,
+    effects: tuple[float, float, float],
+    between: float = 1.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return counts (people, 2, 7) and the design of simulated raters of a reference and another body.
+
+    Every second one is an expert. `effects` are, in logits, an expert's intercept, and the other body's effect on other
+    people and on experts; people differ by `between`. Each rates each body so many times.
+    """
+    expert = np.arange(people) % 2 == 1
+    design = np.zeros((people, 2, 3))
+    design[expert, :, 0], design[~expert, 1, 1], design[expert, 1, 2] = 1.0, 1.0, 1.0
+    leaning = design @ np.array(effects) + between * rng.standard_normal((people, 1))
+    below = expit(_CUTS - leaning[..., None])
+    share = np.diff(below, axis=2, prepend=0.0, append=1.0)
+    return rng.multinomial(ratings, share).astype(float), design
 
 
 def _ratings(studies: int, quick: bool) -> Table:

@@ -5,10 +5,10 @@ python -m benchmarks.find_lump docs/images/find-lump.svg    draws the record
 
 The body is a block of prostatic tissue that holds ⌀15 mm under 10 mm. The observer presses it 30 times, each press with
 a force noise of 7 % (10 % below 1 N) and 1 mm of doubt where along the surface it was, which the slope of the force
-turns into noise. He knows the body without a lump, and of each of several hundred lumps that might be there what it
-would change: by the learnt contrast. Each press is the one that is expected to tell most, under the posterior over no
-lump and all lumps; a place may be pressed again. He says "a lump" where the mean likelihood of all lumps, over that of
-none, is above a threshold that 5 % of simulated examinations without a lump exceed.
+turns into noise. The observer knows the body without a lump, and by the learnt contrast what each of several hundred
+lumps that might be there would change. Each press is the one that is expected to tell most, under the posterior over no
+lump and all lumps; a place may be pressed again. A lump is said to be there where the mean likelihood of all lumps,
+over that of none, is above a threshold that 5 % of simulated examinations without a lump exceed.
 The pressed body is solved with its lump in each of a grid of presses; the same grid is offered to the observer.
 """
 
@@ -38,7 +38,7 @@ DEPTH = 0.0085  # m, of every press of an examination: the fingertip is pressed 
 LATTICE = (5, 5)  # places along x and y, over the box that is touched
 MOST, FEW = 30, 12  # presses of an examination, and to locate a lump that is there
 FALSE_ALARMS = 0.05
-STRONG, FAINT, ONE = 0.07, 0.10, 1.0  # relative noise from 1 N on and below, N
+STRONG, FAINT, LIGHT = 0.07, 0.10, 1.0  # relative noise from 1 N on and below, N
 ASTRAY = 0.001  # m along the surface
 EXAMINATIONS = 400
 HIDDEN = 40  # places of a lump that is to be located
@@ -115,7 +115,7 @@ class Felt:
     @classmethod
     def of(cls, force: np.ndarray, astray: np.ndarray) -> Felt:
         """Return forces with a hand's noise; `astray` is their deviation by the doubt of the place, N."""
-        return cls(force, np.hypot(np.where(force < ONE, FAINT, STRONG) * np.abs(force), astray))
+        return cls(force, np.hypot(np.where(force < LIGHT, FAINT, STRONG) * np.abs(force), astray))
 
     def row(self, i: int) -> Felt:
         """Return those of one body."""
@@ -278,7 +278,7 @@ def measure(body: Surrogate, X: np.ndarray, solved: np.ndarray, quick: bool) -> 
     ]
     learnt = np.array([truths[size]["learnt body"].force[0] for size in SOLVED])
     contrast = _contrast_errors(learnt - none.force, solved)
-    found = next(row["found"] for row in rows if row["truth"] == "finite elements")
+    share = next(row["found"] for row in rows if row["truth"] == "finite elements")
     assert body.lumps is not None
     return [
         Table(
@@ -292,7 +292,7 @@ def measure(body: Surrogate, X: np.ndarray, solved: np.ndarray, quick: bool) -> 
             ],
             rows,
             [
-                Claim(f"share of lumps of ⌀{SIZES[0]:g} mm that are missed", (1.0 - found,), 0.1, ".2f"),
+                Claim(f"share of lumps of ⌀{SIZES[0]:g} mm that are missed", (1.0 - share,), 0.1, ".2f"),
                 Claim("contrast error in these presses, 95th percentile", (contrast[1],), 0.12, ".3f"),
             ],
             [

@@ -18,6 +18,7 @@ from benchmarks.runner import main
 from benchmarks.soft_touch.judge import FIGURES, case_names, figure_text, noticeable, read_case
 from benchmarks.soft_touch.standings import draw, sources, standings, sweep_rows
 from benchmarks.table import Column, Table, quick_mark
+from palpate.validation.report.trace_pictures import save_figure
 
 __all__ = ["tables"]
 
@@ -28,7 +29,7 @@ def tables(*, quick: bool) -> list[Table]:
     """Return the standings and the sweeps."""
     rows = standings(case_names())
     if "--record" in sys.argv and not quick:
-        draw(rows, PICTURE)
+        save_figure(PICTURE, lambda: draw(rows))
     notes = (
         "JND: error over what a hand just notices, 7 % of the force, below 1 N 10 %",
         "a rival's setting is the one that comes nearest on two of the paths, for each body by itself",

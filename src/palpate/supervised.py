@@ -288,7 +288,7 @@ def read_in_child(function: Callable[..., Result], path: Path, *arguments: Any) 
     Time and memory that it may take grow with the file's size. The reader is defined at the top of a module; it takes
     the path and the arguments.
     """
-    parts = sorted(path.iterdir()) if path.is_dir() else [path]
+    parts = [part for part in path.iterdir() if not part.is_dir()] if path.is_dir() else [path]
     for part in parts:
         require_input(part)
     size = sum(part.stat().st_size for part in parts)

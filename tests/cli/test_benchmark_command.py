@@ -53,9 +53,10 @@ def test_standings_hold_the_rival_and_ones_own_method(half_space):
         "    return lambda p: np.interp(case.radius - p[:, 2], [0, 1], [0, 100])[:, None] * [0, 0, 1.0]\n",
         "utf-8",
     )
-    done = run("--judge", mine, "--json", half_space / "out.json", "--plot", half_space / "out.svg")
-    assert done.exit_code == 0, done.output
-    plain = json.loads((half_space / "out.json").read_text("utf-8"))
+    picture = half_space / "out.svg"
+    shown, done = (run("--judge", mine, "--plot", picture, *words) for words in ((), ("--json",)))
+    assert shown.exit_code == done.exit_code == 0, shown.output + done.output
+    plain = json.loads(done.stdout)
     rival, own = plain["rows"]
     assert rival["method"] == standings.METHODS["mass_spring"]
     assert rival["jnd_median"] == pytest.approx(1.0)  # a tenth, of forces below 1 N
@@ -64,16 +65,16 @@ def test_standings_hold_the_rival_and_ones_own_method(half_space):
     assert own["loop_work"] == pytest.approx(0.0, abs=1e-6)  # a spring is conservative
     assert plain["sweep"][0]["jnd_p95"] == pytest.approx(1.0)
     assert plain["sources"] == {rival["method"]: "rival 1.0; a machine"}
-    assert "not given" in done.output
-    assert (half_space / "out.svg").stat().st_size > 1000
+    assert "not given" in shown.stdout
+    assert "mine.py" in picture.read_text("utf-8")
 
 
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("--case", "sponge"), "There is no case 'sponge'"),
+        (("--case", "sponge"), "The case is 'sponge'"),
         (("--judge", "nothing.py"), "There is no file nothing.py"),
-        (("--plot", "standings.txt"), "standings.txt is no picture's name"),
+        (("--plot", "standings.txt"), "does not end in .svg or .png"),
         (("--seed", "3"), "No method can be asked anew on half-space"),
     ],
 )

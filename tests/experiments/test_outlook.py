@@ -40,6 +40,13 @@ def test_a_plan_is_never_overwritten_and_needs_its_bodies(tmp_path, monkeypatch)
         write_plan(name="own")
     with pytest.raises(UsageError, match="at least one body"):
         write_plan(bodies=[tmp_path / "one.palpate"], kind="full-model", name="other")
+    with pytest.raises(UsageError, match=r"one\.toml is a study"):
+        write_plan(bodies=[tmp_path / "one.toml", tmp_path / "two.palpate"], kind="full-model", name="other")
+
+
+def test_the_plan_of_a_study_is_printed_without_its_solves(tmp_path, capsys):
+    write_plan(bodies=[tmp_path / "not-there.toml"], kind="full-model", show=True)
+    assert "other.palpate" in capsys.readouterr().out
 
 
 def test_ratings_are_not_simulated_and_forgetting_asks(tmp_path, monkeypatch):

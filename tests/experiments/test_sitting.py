@@ -11,7 +11,8 @@ import pytest
 from palpate.cli.experiment_commands import write_plan as write_the_plan
 from palpate.errors import FileFormatError, StudyError, UsageError
 from palpate.experiments import analyse, read_plan
-from palpate.experiments.analysis_picture import save_pictures
+from palpate.experiments.analysis import Analysis, PersonResult
+from palpate.experiments.analysis_picture import draw_analysis, save_pictures
 from palpate.experiments.ready_plans import KINDS, ready_plan
 from palpate.experiments.sitting import Sitting
 from palpate.experiments.study_folder import Participant, StudyFolder, read_table
@@ -163,9 +164,29 @@ def test_analysis_finds_each_person_and_the_group(folder):
     assert "Weber fraction" in str(result)
     for person in result.people:
         assert sum(count for _, _, count in person.points) == 80
-    svg, png = save_pictures(result, folder.root / "derivatives")
+    svg, png = save_pictures(result, folder)
     assert "sub-02" in svg.read_text("utf-8")
     assert png.stat().st_size > 10_000
+    folder.forget(Participant("sub-02"))
+    assert not any(picture.exists() for picture in folder.pictures)  # they show a person
+
+
+def test_rows_of_a_picture_are_people_also_where_conditions_have_others(tmp_path):
+    text = ready_plan("discrimination", "two", ["a.palpate", "a.palpate", "c.palpate"])
+    (tmp_path / "plan.toml").write_text(text, "utf-8")
+    people = tuple(
+        PersonResult(f"sub-{k}", condition, 80, (0.1 * k - 0.1, 0.1 * k, 0.1 * k + 0.1), (0.1, 0.2, 0.3), 0.0,
+                     1.0, 0.5, (), ((0.0, 0.5, 80),))
+        for condition, k in (("same", 1), ("same", 3), ("body2", 2), ("body2", 3))
+    )  # fmt: skip
+    drawn = draw_analysis(Analysis(read_plan(tmp_path / "plan.toml"), people, (), (), ()))
+    labels = drawn.axes[2].get_yticklabels()  # of both columns
+    shown = [
+        (labels[round(line.get_ydata()[0])].get_text(), round(line.get_xdata()[0], 9))
+        for axes in drawn.axes[2:]
+        for line in axes.lines[1::2]  # middles; intervals are between them
+    ]
+    assert shown == [(p.participant, round(p.location[1], 9)) for p in people]
 
 
 def test_a_line_that_a_kill_cut_off_is_left_out(folder):

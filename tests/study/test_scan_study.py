@@ -108,6 +108,9 @@ def test_a_folder_of_dicom_slices_is_a_part_with_its_study_beside_it(study, tmp_
     assert path == tmp_path / "series.toml"
     path.write_text(part_text(again, ()), encoding="utf-8")
     assert read_study(path).body.bare() == again.body.bare()
+    folder.rename(tmp_path / "elsewhere")
+    with pytest.raises(UsageError, match="can't be read"):
+        read_study(path).body.build()
 
 
 def test_the_rough_study_has_larger_elements_in_the_tissues_unless_triangles_were_picked(study):

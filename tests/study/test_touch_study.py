@@ -102,7 +102,7 @@ def test_units_are_allowed_and_kept_in_si(tmp_path):
         ('[body]\nkind = "block"\n[interaction]\ndepth = [0.01, 0.002]', "is no range"),
         (
             '[body]\nkind = "block"\n[interaction]\ndepth = ["0.2 mm", "-2 mm"]',
-            'for example depth = ["0.2 mm", "8 mm"]',
+            'for example depth = ["0.2 mm", "5 mm"]',
         ),
         ('[body]\nkind = "block"\n[sweep]\nsamples = 8\ndepths = 9', "no depth series"),
         ('[body]\nkind = "block"\n[learning]\nsecond = 3', "learning.second: there is no such key"),
@@ -239,7 +239,7 @@ def test_files_of_the_first_version_are_read(text, tmp_path):
         ('[interaction]\nkind = "probe"', "a cantilever takes the interaction loads, not probe"),
         (
             '[interaction]\nkind = "prob"',
-            "no kind of interaction 'prob'; there are loads, probe, tool, pad; did you mean",
+            "no kind of interaction 'prob'; there are loads, probe, tool, pinch, pad; did you mean",
         ),
         ('[body]\nmaterial = "annealed copper"', "remembers its history: give a table [memory]"),
         ("[memory]\nhistories = 3", "which 'nylon' does not"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import json
 import sys
 import tempfile
 from importlib.util import module_from_spec, spec_from_file_location
@@ -12,11 +11,12 @@ from typing import Annotated, Any
 
 import typer
 
+from palpate.checks import one_of
 from palpate.cli.command_names import CommandGroup
 from palpate.cli.console import Console
 from palpate.cli.number_options import count_option
+from palpate.cli.table_options import Json
 from palpate.errors import UsageError
-from palpate.files import write_file
 
 __all__ = ["benchmark_app", "soft_touch"]
 
@@ -49,29 +49,27 @@ def soft_touch(
             "--seed", least=0, help="Solve other places, of this seed, and judge there. Takes minutes a body."
         ),
     ] = None,
-    json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures to this file.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the standings: a .svg or .png file.")] = None,
+    as_json: Json = False,
 ) -> None:
     """Compare soft bodies of simulators and surrogates by the force on a hand, and your own method with them."""
     from palpate.output_files import require_outputs
+    from palpate.validation.report.trace_pictures import save_figure
 
-    require_outputs([path for path in (json_file, plot) if path is not None], overwrite=True)
-    if plot is not None and plot.suffix.lower() not in {".svg", ".png"}:
-        raise UsageError(f"{plot} is no picture's name.", fix="Write to NAME.svg or NAME.png.")
+    if plot is not None:
+        require_outputs([plot], endings=(".svg", ".png"))
     folder = _folder()
     judging, standing = _module(folder, "judge"), _module(folder, "standings")
     try:
         rows = _rows(judging, standing, _cases(judging, case), judge, seed)
     except judging.JudgeError as error:
         raise UsageError(error.what, why=error.why, fix=error.fix) from error
-    Console().say(standing.standings_text(rows))
-    if json_file is not None:
-        plain = {"rows": rows, "sweep": standing.sweep_rows()}
-        content = {key: [judging.plain_figures(row) for row in part] for key, part in plain.items()}
-        content["sources"] = standing.sources()
-        write_file(json_file, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     if plot is not None:
-        standing.draw(rows, plot)
+        save_figure(plot, lambda: standing.draw(rows))
+    sweep, sources = (standing.sweep_rows(), standing.sources()) if as_json else ([], {})
+    parts = {"rows": rows, "sweep": sweep}
+    content = {key: [judging.plain_figures(row) for row in part] for key, part in parts.items()}
+    Console(as_json).result(standing.standings_text(rows), content | {"sources": sources})
 
 
 def _folder() -> Path:
@@ -103,10 +101,7 @@ def _cases(judging: Any, wanted: list[str] | None) -> list[str]:
     names = judging.case_names()
     if not names:
         raise UsageError("No case has an oracle yet.", fix="Run python -m benchmarks.soft_touch.make_cases.")
-    unknown = [name for name in wanted or () if name not in names]
-    if unknown:
-        raise UsageError(f"There is no case {unknown[0]!r}.", fix=f"Cases are {', '.join(names)}.")
-    return wanted or names
+    return [one_of("The case", name, names) for name in wanted or names]
 
 
 def _rows(

@@ -30,7 +30,7 @@ experiment_app = typer.Typer(
 
 PlanFile = Annotated[Path, typer.Argument(help="Plan, as [bold]palpate experiment plan[/] writes it.")]
 Who = Annotated[str, typer.Argument(help="Label of the participant, such as sub-01; never a name.")]
-_FEWEST = 6  # solves from which a body is learnt
+_EXAMPLES = ("body.palpate", "other.palpate")  # where no file is named
 SIMULATED = "Everything here was tried on simulated observers only, never on people."
 
 
@@ -65,11 +65,18 @@ def write_plan(
             fix="Give another --name or --out.",
         )
     notes = dict[Path, str]()
-    if kind == "full-model" and bodies and len(bodies) == 1 and bodies[0].suffix == ".toml" and not show:
-        ready_plan(kind, name, ["body.palpate", "other.palpate"])  # a wrong name is refused before the solves
-        notes = _solve_full_model(bodies[0], Console())
+    if bodies and kind == "full-model" and [body.suffix for body in bodies] == [".toml"]:
+        ready_plan(kind, name, _EXAMPLES)  # a wrong name is refused before the solves
+        notes, bodies = {} if show else _solve_full_model(bodies[0], Console()), None
+    for body in bodies or ():
+        if body.suffix == ".toml":
+            raise UsageError(
+                f"{body} is a study, and a plan names learnt bodies.",
+                why="A study alone, with --kind full-model, is what presses are solved of.",
+                fix=f"Name the model file that `palpate learn {body}` writes.",
+            )
     files = [_path_from(file.parent, body) for body in notes or bodies or ()]
-    text = ready_plan(kind, name, files or ["body.palpate", "other.palpate"], tuple(notes.values()))
+    text = ready_plan(kind, name, files or _EXAMPLES, tuple(notes.values()))
     if show:
         typer.echo(text)
         return
@@ -87,6 +94,7 @@ def _solve_full_model(path: Path, console: Console) -> dict[Path, str]:
     from palpate.cli.exam_command import learnt_study
     from palpate.experiments.recorded_presses import body_of_presses, line_errors, solve_presses
     from palpate.learning.loading import load_surrogate
+    from palpate.learning.pressed_solves import FEWEST
     from palpate.runtime.touchable import touchable
     from palpate.study import read_study
     from palpate.study.run import learn_study, load_data
@@ -100,7 +108,7 @@ def _solve_full_model(path: Path, console: Console) -> dict[Path, str]:
     store = Path(f"{stem}-presses.zarr")
     presses, unseen = solve_presses(study.problem(whole=True), touchable(whole), store)
     reference = body_of_presses(presses, unseen, f"{study.name}, full model", console.say)
-    count = max(_FEWEST, len(train) // 8)
+    count = max(FEWEST, len(train) // 8)
     few, _ = learn_study(study, train.take(np.arange(min(count, len(train)))), log=console.say)
     files = {"presses": reference, f"{count}-solves": few, "": whole}
     named = {Path(f"{stem}-{end}.palpate") if end else model: body for end, body in files.items()}
@@ -229,7 +237,7 @@ def analyse_folder(plan: PlanFile, as_json: Json = False) -> None:
     folder = StudyFolder.beside(plan)
     folder.require_plan(plan)
     analysis = analyse(folder)
-    pictures = [str(path) for path in save_pictures(analysis, folder.root / "derivatives")]
+    pictures = [str(path) for path in save_pictures(analysis, folder)]
     drawn = "".join(f"\n{path}" for path in pictures)
     Console(as_json).result(f"{analysis}{drawn}", analysis.as_dict() | {"pictures": pictures})
 

@@ -41,6 +41,7 @@ KEPT = {
     "doctor": _AS_BEFORE,
     "exam": "What was pressed and marked is kept: the page's list goes on with that examination.",
     "experiment": _WHOLE,
+    "experiment plan": _GOES_ON,
     "experiment forget": "What is not forgotten yet is as it was: the same command goes on.",
     "experiment run": "All trials that were answered are kept: the same command goes on with the next one.",
     "export": _WHOLE,

@@ -36,9 +36,7 @@ class PersonResult:
     deviance: float
     p: float  # share of repetitions from the fitted function whose deviance is larger
     notes: tuple[str, ...]  # a sentence on each thing that makes the estimate doubtful
-    points: tuple[
-        tuple[float, float, int], ...
-    ]  # level, share of the answers that p counts, number of answers
+    points: tuple[tuple[float, float, int], ...]  # level, share that is drawn over it, number of answers
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.experiments.analysis import Analysis, PersonResult
 from palpate.experiments.psychometric import JND
+from palpate.experiments.study_folder import StudyFolder
 from palpate.validation.report.style import BLUE, INK, ORANGE, figure
 from palpate.validation.report.trace_pictures import save_figure
 
@@ -22,20 +23,19 @@ _WIDTH, _TOP, _ROW = 4.6, 3.2, 0.22  # inches: of a condition, of its functions,
 _LARGEST = 70.0  # points², of the dot of the most answers
 
 
-def save_pictures(analysis: Analysis, folder: Path) -> list[Path]:
-    """Write the picture as SVG and PNG into a folder of derivatives, anew each time; nothing of ratings alone."""
+def save_pictures(analysis: Analysis, folder: StudyFolder) -> list[Path]:
+    """Write the picture into the experiment's folder, anew each time; nothing of ratings alone."""
     if not analysis.people:
         return []
-    folder.mkdir(parents=True, exist_ok=True)
-    stem = f"task-{analysis.plan.name}_psychometric"
-    return [save_figure(folder / f"{stem}.{end}", lambda: draw_analysis(analysis)) for end in ("svg", "png")]
+    folder.pictures[0].parent.mkdir(exist_ok=True)
+    return [save_figure(path, lambda: draw_analysis(analysis)) for path in folder.pictures]
 
 
 def draw_analysis(analysis: Analysis) -> Figure:
     """Return the figure: a column for each condition, functions above and people's μ with their intervals below."""
     names = [c.name for c in analysis.plan.comparison if any(p.condition == c.name for p in analysis.people)]
-    rows = max(sum(p.condition == name for p in analysis.people) for name in names) + 1
-    below = max(_ROW * rows + 0.6, 1.1)
+    labels = sorted({p.participant for p in analysis.people})  # of the rows, which all columns share
+    below = max(_ROW * (len(labels) + 1) + 0.6, 1.1)
     drawn, axes = figure(
         2, len(names), size=(_WIDTH * len(names), _TOP + below), height_ratios=(_TOP, below),
         sharex="col", sharey="row",
@@ -43,7 +43,7 @@ def draw_analysis(analysis: Analysis) -> Figure:
     for column, name in enumerate(names):
         people = [p for p in analysis.people if p.condition == name]
         _functions(axes[0, column], analysis, people)
-        _locations(axes[1, column], analysis, name, people)
+        _locations(axes[1, column], analysis, labels, people)
         axes[0, column].set_title(name)
     axes[0, 0].set_ylabel(
         "share named stiffer" if analysis.plan.question == "discrimination" else "share right"
@@ -76,23 +76,23 @@ def _functions(axes: Axes, analysis: Analysis, people: list[PersonResult]) -> No
     axes.axvline(0.0, color=INK, lw=0.5, visible=signed)
 
 
-def _locations(axes: Axes, analysis: Analysis, name: str, people: list[PersonResult]) -> None:
+def _locations(axes: Axes, analysis: Analysis, labels: list[str], people: list[PersonResult]) -> None:
     plan = analysis.plan
-    for row, person in enumerate(people, 1):
+    for person in people:
+        row = 1 + labels.index(person.participant)
         low, middle, high = person.location
         axes.plot([low, high], [row, row], color=BLUE, lw=1.6)
         axes.plot([middle], [row], "o", color=BLUE, ms=4)
-    group = next((g for g in analysis.groups if g.condition == name), None)
-    labels = [p.participant for p in people]
+    group = next((g for g in analysis.groups if g.condition == people[0].condition), None)
     if group is not None:
-        at = group.location
-        axes.plot([at.low, at.high], [0, 0], color=ORANGE, lw=2.4)
-        axes.plot([at.mean], [0], "D", color=ORANGE, ms=6)
+        mean = group.location
+        axes.plot([mean.low, mean.high], [0, 0], color=ORANGE, lw=2.4)
+        axes.plot([mean.mean], [0], "D", color=ORANGE, ms=6)
         if group.same is not None:
             half = group.same.margin * float(np.exp(group.log_spread.mean))
             axes.axvspan(-half, half, color=ORANGE, alpha=0.12, lw=0)
-    axes.set_yticks(range(len(people) + 1), ["group", *labels])
-    axes.set_ylim(len(people) + 0.6, -0.6)
+    axes.set_yticks(range(len(labels) + 1), ["group", *labels])
+    axes.set_ylim(len(labels) + 0.6, -0.6)
     low, high = plan.levels[[0, -1]]
     middle = 0.0 if low < 0.0 < high and plan.question == "discrimination" else (low + high) / 2.0
     ticks = [low, (low + middle) / 2.0, middle, (middle + high) / 2.0, high]

@@ -67,14 +67,15 @@ def cumulative_logit(counts: np.ndarray, design: np.ndarray, groups: int = 1) ->
     """
     counts = counts[:, :, counts.sum(axis=(0, 1)) > 0]  # nobody's rating has no threshold
     cuts, k = counts.shape[2] - 1, design.shape[2]
+    unknown = np.tile([-np.inf, 0.0, np.inf], (k, 1)), 0.0
     if not cuts:
-        return np.tile([-np.inf, 0.0, np.inf], (k, 1)), 0.0
+        return unknown
 
     def loss(z: np.ndarray) -> float:
         cut = np.cumsum(np.concatenate([z[:1], np.exp(z[1:cuts])]))
         effects, tau = z[cuts : cuts + k], np.exp(z[-1])
-        at_node = (design @ effects)[:, None, :, None] + tau * _NODES[None, :, None, None]
-        below = expit(cut - at_node)
+        leaning = (design @ effects)[:, None, :, None] + tau * _NODES[None, :, None, None]
+        below = expit(cut - leaning)
         edge = np.zeros((*below.shape[:3], 1))
         share = np.diff(np.concatenate([edge, below, edge + 1.0], axis=3), axis=3)
         log = (counts[:, None] * np.log(np.maximum(share, _LEAST))).sum(axis=(2, 3))
@@ -85,9 +86,11 @@ def cumulative_logit(counts: np.ndarray, design: np.ndarray, groups: int = 1) ->
     start = np.log(shares / (1.0 - shares))
     z = np.concatenate([start[:1], np.log(np.diff(start)), np.zeros(k + 1)])
     z = minimize(loss, z, method="BFGS").x
-    covariance = np.linalg.pinv(_second_differences(loss, z), hermitian=True)
+    curvature = _second_differences(loss, z)
+    if np.linalg.eigvalsh(curvature)[0] <= 0.0:  # the search ended beside the maximum
+        return unknown
     rows = slice(cuts, cuts + k)
-    deviation = np.sqrt(np.maximum(np.diag(covariance)[rows], 0.0))
+    deviation = np.sqrt(np.diag(np.linalg.inv(curvature))[rows])
     between = np.ptp(design, axis=1).max(axis=0) == 0.0
     quantile = np.where(between, student.ppf(0.975, max(len(counts) - groups, 1)), ndtri(0.975))
     half = quantile * deviation
@@ -131,7 +134,7 @@ def rate(
         place = kind - 1 if c == 0 else len(kinds) - 1 + kind * others + c - 1
         odds = None if effects is None or place < 0 else effects[place]
         low, middle, high = np.quantile(middles, [0.25, 0.5, 0.75]).tolist()
-        against = "the reference" if c else f"{kinds[0]}"
+        against = "the reference" if c else kinds[0]
         span = None if odds is None or not np.isfinite(odds).all() else (odds[0], odds[1], odds[2])
         results.append(
             RatingResult(

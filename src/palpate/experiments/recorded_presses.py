@@ -22,13 +22,10 @@ from palpate.sweeps import sweep
 
 __all__ = ["body_of_presses", "line_errors", "solve_presses"]
 
-_ON, _BESIDE, _BETWEEN = (
-    24,
-    4,
-    8,
-)  # depths on the line, at each of four places beside it, and between for judging
+# depths on the line, at each of four places beside it, and between for judging
+_ON, _BESIDE, _BETWEEN = 24, 4, 8
 _STRAY = 1 / 6  # of the probe's radius: how far beside the line
-_FELT = 0.1  # of the largest force on the line: below, an error isn't told as a share
+_LEAST_FORCE = 0.1  # of the largest force on the line: below, an error isn't told as a share
 LARGEST_ERROR = 0.02  # of the force: a third of the JND of stiffness, 7 %
 
 
@@ -37,7 +34,7 @@ def solve_presses(problem: Any, body: Touchable, path: Path) -> tuple[Dataset, D
 
     Further inputs have the middle of their ranges. A store that is there goes on, or is read.
     """
-    if body.holds or body.tool is not None:
+    if body.holds or body.tool is not None or body.gripper is not None:
         raise UsageError(
             f"{body.name} can't be pressed along a line.",
             why="Presses of the full model are those of a ball that is free.",
@@ -50,11 +47,11 @@ def solve_presses(problem: Any, body: Touchable, path: Path) -> tuple[Dataset, D
     between = (on[1:-1:2] + on[2::2])[: _ON // 2] / 2.0
     between = between[np.linspace(0, len(between) - 1, _BETWEEN).round().astype(int)]
     lines = [(places[0], on), *((place, beside) for place in places[1:]), (places[0], between)]
-    felt = np.vstack([place - np.outer(depths, body.normal) for place, depths in lines])
+    centres = np.vstack([place - np.outer(depths, body.normal) for place, depths in lines])
     rest = [(r.low + r.high) / 2.0 for r in body.parameters]
-    rows = np.hstack([felt, np.tile(rest, (len(felt), 1))])
-    known = [r.name for r in body.inputs]
-    data = sweep(problem, points=rows[:, [known.index(r.name) for r in problem.ranges]], path=path)
+    rows = np.hstack([centres, np.tile(rest, (len(centres), 1))])
+    names = [r.name for r in body.inputs]
+    data = sweep(problem, points=rows[:, [names.index(r.name) for r in problem.ranges]], path=path)
     cut = len(data) - _BETWEEN
     return data.take(np.arange(cut)).ok, data.take(np.arange(cut, len(data))).ok
 
@@ -62,12 +59,13 @@ def solve_presses(problem: Any, body: Touchable, path: Path) -> tuple[Dataset, D
 def line_errors(bodies: Mapping[str, Surrogate], presses: Dataset) -> dict[str, tuple[float, float]]:
     """Return the mean and the largest force error of bodies along the line, as shares of the force of the presses."""
     size = np.linalg.norm(presses.force, axis=1)
-    felt = size >= _FELT * size.max()
+    counted = size >= _LEAST_FORCE * size.max()
     errors = {}
     for name, body in bodies.items():
         energy = touchable(body).energy
         columns = [[r.name for r in presses.ranges].index(r.name) for r in energy.inputs]
-        off = np.linalg.norm(energy.force(presses.X[:, columns]) - presses.force, axis=1)[felt] / size[felt]
+        missed = energy.force(presses.X[:, columns]) - presses.force
+        off = np.linalg.norm(missed, axis=1)[counted] / size[counted]
         errors[name] = (float(off.mean()), float(off.max()))
     return errors
 

@@ -7,15 +7,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import expit, ndtri
+from scipy.special import ndtri
 
 from palpate.experiments.course import Course, Progress
 from palpate.experiments.observers import Observer
 from palpate.experiments.placement import Staircase
 
-__all__ = ["Simulated", "simulate_course", "simulate_people", "simulate_raters"]
-
-_CUTS = np.array([-3.0, -1.8, -0.8, 0.2, 1.2, 2.4])  # thresholds between ratings of simulated raters, logits
+__all__ = ["Simulated", "simulate_course", "simulate_people"]
 
 
 @dataclass(frozen=True)
@@ -136,27 +134,6 @@ def simulate_course(
         caught=float(np.nanmean(course.caught(state))) if course.catch else None,
         reversals_bias=_reversals_bias(course, state, observer),
     )
-
-
-def simulate_raters(
-    rng: np.random.Generator,
-    people: int,
-    ratings: int,
-    effects: tuple[float, float, float],
-    between: float = 1.0,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return counts (people, 2, 7) and the design of simulated raters of a reference and another body.
-
-    Every second one is an expert. `effects` are, in logits, an expert's intercept, and the other body's effect on other
-    people and on experts; people differ by `between`. Each rates each body so many times.
-    """
-    expert = np.arange(people) % 2 == 1
-    design = np.zeros((people, 2, 3))
-    design[expert, :, 0], design[~expert, 1, 1], design[expert, 1, 2] = 1.0, 1.0, 1.0
-    leaning = design @ np.array(effects) + between * rng.standard_normal((people, 1))
-    below = expit(_CUTS - leaning[..., None])
-    share = np.diff(below, axis=2, prepend=0.0, append=1.0)
-    return rng.multinomial(ratings, share).astype(float), design
 
 
 def _coverage(interval: np.ndarray, truth: float) -> float:

@@ -98,10 +98,8 @@ class Stimuli:
             return
         if what == "lump":
             for name in (c.name for c in self.plan.comparison):
-                for level in self.plan.levels[[0, -1]]:
-                    self._lumped(
-                        name, self.plan.value(float(level))
-                    )  # one that leaves the body is refused here
+                for level in self.plan.levels[[0, -1]]:  # a lump that leaves the body is refused here
+                    self._lumped(name, self.plan.value(float(level)))
             return
         for name in (c.name for c in self.plan.comparison):
             place = _index(self.bodies[name], what, name)

@@ -3,6 +3,7 @@
 ::
 
     NAME/
+      derivatives/               pictures of the analysis, drawn anew each time
       dataset_description.json   plan.toml   participants.tsv   participants.json
       task-NAME_events.json      meaning, unit and levels of every column
       stimuli/                   the bodies that were felt
@@ -12,7 +13,7 @@
         sub-01_task-NAME_run-01_notes.tsv     notes of the experimenter
         sub-01_task-NAME_run-01_trial-007_interval-1.trace    every tick of a touch, for `palpate replay`
 
-Nothing that is there is ever overwritten. Labels are letters and digits, and nothing that identifies a person is asked.
+Nothing but the pictures is ever overwritten. Labels are letters and digits; nothing that identifies a person is asked.
 """
 
 from __future__ import annotations
@@ -161,6 +162,12 @@ class StudyFolder:
         rated = {r.name: {"Description": r.text, "Levels": levels} for r in self.plan.rating}
         return COLUMNS | rated
 
+    @property
+    def pictures(self) -> tuple[Path, Path]:
+        """The picture of the analysis as SVG and PNG; it shows each person."""
+        stem = self.root / "derivatives" / f"task-{self.plan.name}_psychometric"
+        return stem.with_suffix(".svg"), stem.with_suffix(".png")
+
     def enrol(self, participant: Participant) -> None:
         """Add a participant to the table, unless they are in it."""
         table = self.root / "participants.tsv"
@@ -194,7 +201,10 @@ class StudyFolder:
         )
 
     def forget(self, participant: Participant) -> int:
-        """Remove a person's folder and their row; return how many files are gone. Who isn't there is refused."""
+        """Remove a person's folder, their row, and the pictures, which show them; return how many files they had.
+
+        Who isn't there is refused.
+        """
         folder, table = self.root / participant.label, self.root / "participants.tsv"
         rows = read_table(table) if table.exists() else []
         known = [row for row in rows if row["participant_id"] != participant.label]
@@ -207,6 +217,8 @@ class StudyFolder:
         _require_free(folder)
         count = sum(1 for p in folder.rglob("*") if p.is_file() and not p.name.startswith("."))
         with system_errors(f"Could not remove {folder}."):
+            for picture in self.pictures:
+                picture.unlink(missing_ok=True)
             if folder.exists():
                 shutil.rmtree(folder)
         lines = ["\t".join(PEOPLE), *("\t".join(row[k] for k in PEOPLE) for row in known)]

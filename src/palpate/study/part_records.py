@@ -206,7 +206,7 @@ class PartRecord(Record):
             )
         if kind == "scan" and self.unit is not None:
             raise ValueError(f"{self.file} is a scan and states its lengths: leave out unit")
-        if kind != "scan" and (self.labels or self.up):
+        if kind not in {"scan", ""} and (self.labels or self.up):  # a folder that is gone has no kind
             raise ValueError("labels and up are for scans, such as NRRD files")
         if self.element is not None and kind == "mesh":
             raise ValueError(f"{self.file} is a mesh and keeps its elements: leave out element")

@@ -129,8 +129,9 @@ class TestSeries:
 
     def test_a_folder_and_a_slice_in_it_are_the_volume_with_its_oblique_axes(self, oblique):
         path, folder = oblique
+        (folder / "reports").mkdir()
         volume = read_scan(str(path))
-        for name in (folder, next(folder.iterdir())):
+        for name in (folder, next(folder.glob("*.dcm"))):
             series = read_scan(str(name))
             assert np.array_equal(series.labels, volume.labels)
             assert series.spacing == pytest.approx(volume.spacing, rel=1e-6)

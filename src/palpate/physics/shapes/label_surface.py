@@ -28,10 +28,8 @@ FAIR = 3.0  # voxels: waves of 2π times this length are halved where terraces a
 STEEP = 3.0  # largest cotangent of a triangle's angle: slivers would else hold their corners
 HELD = 1e6  # lattice squares: what a move of a place that is held weighs
 LEAST_SHARE = 0.05  # of a lattice square: least area around a vertex, against slivers
-SHIFTS, MOST_SHIFT = (
-    6,
-    0.1,
-)  # rounds in which volumes are kept, and how far surfaces move in each, in lattice spacings
+# rounds in which volumes are kept, and how far surfaces move in each, in lattice spacings
+SHIFTS, MOST_SHIFT = 6, 0.1
 FAIR_ROUNDS = 3  # of this, each within half a voxel
 TERRACE = 0.5  # of a voxel: how far a place moves by it
 STEP = 0.05  # of the lattice's spacing, in the difference quotient of an indicator

@@ -28,6 +28,7 @@ from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volum
 from palpate.physics.shapes.mesh_file import refine_mesh
 from palpate.physics.shapes.meshing import GRADING, THREADS, FineMesh, require_budget
 from palpate.physics.shapes.naming import require_name
+from palpate.physics.shapes.packed_file import require_file
 from palpate.physics.shapes.scan_file import LabelImage, clear_specks, name_labels, read_scan
 from palpate.physics.shapes.shape import Shape, require_size
 
@@ -118,6 +119,7 @@ class ImportedScan(Shape):
         if self.element is not None:
             checks.positive("The element size", self.element, "m")
         if part_kind(self.path) != "scan":
+            require_file(self.path)  # a folder that is gone has no kind
             raise UsageError(
                 f"{self.path} is no labelmap of a scan.",
                 why=f"Its name ends in {Path(self.path).suffix or 'nothing'!r}.",
@@ -305,10 +307,11 @@ def _notes(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, 
         thick = 2 * wanted / max(around, 1e-12)
         said = f"{1e6 * there:.3g} ml of {name} in the mesh, {1e6 * wanted:.3g} ml in the voxels"
         if there < LOST * wanted:
+            finer = millimetres(min(KEEPS * thick, spacing / 2))
             raise UsageError(
                 f"Elements of {millimetres(spacing)} are too large for {name!r} in {path}.",
                 why=f"It is too thin: {said}.",
-                fix=f"Choose smaller ones, such as {millimetres(KEEPS * thick)}, or leave the label out.",
+                fix=f"Choose smaller ones, such as {finer}, or leave the label out.",
             )
         if thick < spacing or abs(there - wanted) > TELLS * wanted:
             told.append(

@@ -74,7 +74,11 @@ def read_scan(path: str) -> LabelImage:
             fix="pip install 'palpate[scan]'.",
         )
     _require_spacing(path)
-    return read_in_child(_read, Path(path))
+    file = Path(path)
+    if part_ending(path) == DICOM_ENDING and file.is_file():
+        # time and memory that reading may take are those of all slices
+        return read_in_child(_read, file.parent, file.name)
+    return read_in_child(_read, file)
 
 
 def _require_spacing(path: str) -> None:
@@ -96,14 +100,16 @@ def _require_spacing(path: str) -> None:
         )
 
 
-def _read(path: Path) -> LabelImage:
-    """Return the content of a file: a function for the child process in which ITK runs."""
+def _read(path: Path, name: str = "") -> LabelImage:
+    """Return the content of a file, or of the series in a folder: for the child process in which ITK runs.
+
+    `name` is that of a slice in the folder, whose series is meant.
+    """
     import SimpleITK
 
     SimpleITK.ProcessObject.SetGlobalWarningDisplay(False)
     try:
-        is_series = path.is_dir() or part_ending(path) == DICOM_ENDING
-        image = read_series(path) if is_series else SimpleITK.ReadImage(str(path))
+        image = read_series(path / name) if path.is_dir() else SimpleITK.ReadImage(str(path))
     except RuntimeError as error:
         said = str(error).strip().rpartition("\n")[2].strip() or "ITK reports an error"
         raise FileFormatError(
@@ -146,8 +152,8 @@ def _nifti_notes(header: dict[str, str], shape: tuple[int, ...]) -> tuple[str, .
     linear = np.array([[float(word) for word in header[f"srow_{axis}"].split()] for axis in "xyz"])
     offset = np.array([float(header[f"qoffset_{axis}"]) for axis in "xyz"])
     ends = np.stack(np.meshgrid(*[(0, n - 1) for n in shape], indexing="ij"), axis=-1).reshape(-1, 3)
-    # the third axis of the quaternion is turned round where the header's voxels are left-handed
-    size[2] *= np.sign(np.linalg.det(linear[:, :3])) * np.sign(np.linalg.det(turn))
+    # ITK hides the sign of the quaternion's third axis: it is taken to be as left-handed as the other placement
+    size[2] *= np.sign(np.linalg.det(linear[:, :3]))
     apart = ends @ (linear[:, :3] - turn * size).T + linear[:, 3] - offset
     far = float(np.linalg.norm(apart, axis=1).max())
     if far <= PLACED * float(np.abs(size).min()):
@@ -279,14 +285,15 @@ def clear_specks(image: LabelImage) -> LabelImage:
 
 
 def _give_away(image: LabelImage, unclear: np.ndarray) -> LabelImage:
-    """Return the image whose unclear voxels (n, 3) have each the label of the nearest clear one, which touches one."""
+    """Return the image whose unclear voxels (n, 3) have each the label of the nearest clear one.
+
+    It shares a face with an unclear one: a step towards the voxel that it is nearest to leads to none that is clear.
+    """
     from scipy.spatial import KDTree
 
     if not len(unclear):
         return image
-    around = (unclear[:, None] + np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), axis=-1).reshape(-1, 3)).reshape(
-        -1, 3
-    )
+    around = np.concatenate([unclear + step for step in (*np.eye(3, dtype=int), *-np.eye(3, dtype=int))])
     around = np.unique(around[((around >= 0) & (around < image.labels.shape)).all(axis=1)], axis=0)
     labels = image.labels.copy()
     labels[tuple(unclear.T)] = UNCLEAR

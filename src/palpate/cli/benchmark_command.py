@@ -125,9 +125,9 @@ def _rows(
         for name in cases:
             make_places(name, seed, Path(scratch) / name)
         read = {name: judging.read_case(name, Path(scratch)) for name in cases}
-        own = _folder() / "methods" / "palpate_surrogate.py"
+        ours = _folder() / "methods" / "palpate_surrogate.py"
         of_learnt = {name: read[name] for name in learnt}
-        figures = {"palpate's surrogate": _figures(judging, own, of_learnt)["palpate_surrogate.py"]}
+        figures = {"palpate's surrogate": _figures(judging, ours, of_learnt)["palpate_surrogate.py"]}
         figures |= _figures(judging, file, read) if file else {}
     return [
         {"case": name, "method": title, "settings": f"places of seed {seed}", **of_cases[name]}

@@ -67,9 +67,10 @@ def soft_touch(
     if plot is not None:
         save_figure(plot, lambda: standing.draw(rows))
     sweep, sources = (standing.sweep_rows(), standing.sources()) if as_json else ([], {})
-    parts = {"rows": rows, "sweep": sweep}
-    content = {key: [judging.plain_figures(row) for row in part] for key, part in parts.items()}
-    Console(as_json).result(standing.standings_text(rows), content | {"sources": sources})
+    # a figure that is not given is null in JSON
+    rows_plain, sweep_plain = ([judging.plain_figures(row) for row in part] for part in (rows, sweep))
+    content = {"rows": rows_plain, "sweep": sweep_plain, "sources": sources}
+    Console(as_json).result(standing.standings_text(rows), content)
 
 
 def _folder() -> Path:
@@ -125,9 +126,9 @@ def _rows(
         for name in cases:
             make_places(name, seed, Path(scratch) / name)
         read = {name: judging.read_case(name, Path(scratch)) for name in cases}
-        ours = _folder() / "methods" / "palpate_surrogate.py"
+        surrogate = _folder() / "methods" / "palpate_surrogate.py"
         of_learnt = {name: read[name] for name in learnt}
-        figures = {"palpate's surrogate": _figures(judging, ours, of_learnt)["palpate_surrogate.py"]}
+        figures = {"palpate's surrogate": _figures(judging, surrogate, of_learnt)[surrogate.name]}
         figures |= _figures(judging, file, read) if file else {}
     return [
         {"case": name, "method": title, "settings": f"places of seed {seed}", **of_cases[name]}

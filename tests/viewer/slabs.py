@@ -21,12 +21,12 @@ from palpate.surrogates import (
     Surrogate,
     TouchedSurface,
 )
-from palpate.surrogates.baselines import PosedBaseline, ToolBaseline, deepest_ball
+from palpate.surrogates.baselines import PinchBaseline, PosedBaseline, ToolBaseline, deepest_ball
 from palpate.surrogates.fields import DepthAmplitude, LocalMode, Variation
 from palpate.surrogates.fields.local_mode import design
 from palpate.surrogates.learnt_torque import ARM
 from palpate.surrogates.memories import Indentation, Relaxation
-from palpate.tools import Capsule, PosedTool
+from palpate.tools import Capsule, Gripper, PosedTool
 from palpate.units import Quantity, Range
 
 HALF, HIGH = 0.03, 0.02  # m: 60 × 60 × 20 mm
@@ -194,5 +194,35 @@ def _under(baseline: ToolBaseline, posed: PosedTool, **more: object) -> Surrogat
         local_mode=replace(plain.local_mode, variation=None),
         continuation=None,
         **more,
+    )
+    return Surrogate(energy, fields={"displacement": shown}, meta={"name": "slab"})
+
+
+def pinched_slab() -> Surrogate:
+    """The slab between two capsules that lie along y and close along x, with its displacement."""
+    described = json.dumps(Gripper(Capsule(0.005, 0.02)).describe(), sort_keys=True)
+    points, triangles = box(1)
+    sides = np.abs(np.ptp(points[triangles][..., 0], axis=1)) < 1e-9
+    touched = TouchedSurface.of(points, triangles[sides], radius=0.005, spacing=0.0015)
+    ways = {"grip_x": (-0.002, 0.002), "grip_y": (-0.006, 0.006), "grip_z": (-0.014, -0.006)}
+    inputs = tuple(Range(name, *ends, "m") for name, ends in {**ways, "grip_opening": (0.052, 0.059)}.items())
+    energy = LearntEnergy(
+        linear_network(
+            list(inputs), [Quantity("ln U/U0")], np.array([[np.log(pressed.A), 0.1, 0.0, 0.0, 0.0]])
+        ),
+        PinchBaseline(ContactLaw("pad"), touched, 0.005, tool=described),
+        continuation=Continuation.of(inputs, deepest=0.005),
+    )
+    plain = _field(pressed.surrogate().hand_energy, 3)
+    shown = replace(
+        plain,
+        network=linear_network(
+            list(inputs), [Quantity("b0"), Quantity("b1")], np.hstack([plain.network.tail, np.zeros((2, 1))])
+        ),
+        surface=touched,
+        radius=0.005,
+        tool=described,
+        local_mode=None,
+        continuation=None,
     )
     return Surrogate(energy, fields={"displacement": shown}, meta={"name": "slab"})

@@ -41,6 +41,7 @@ from palpate.files import TemporaryFolder
 from palpate.runtime import LoopProcess
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Lump, Surrogate
+from palpate.surrogates.baselines import require_one_tool
 from palpate.viewer.exam_messages import ExamMark, ExamNews, ExamWish, FormerExam
 from palpate.viewer.messages import PROTOCOL
 from palpate.viewer.page_model import PageModel
@@ -93,6 +94,7 @@ class ExamPage(LocalServer):
         **server: Unpack[ServerOptions],
     ) -> None:
         super().__init__(**server)
+        require_one_tool(surrogate.hand_energy.baseline, "be examined")
         self.kind, self._surrogate, self._device = kind, surrogate, device
         self.directory = exam_directory() if directory is None else directory
         self._seed, self._clocks = secrets.randbits(31) if seed is None else seed, clocks

@@ -27,6 +27,7 @@ from palpate.files import write_file
 from palpate.output_files import require_outputs, with_seal
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import FieldSurrogate, NodeField, Surrogate
+from palpate.surrogates.fields import surface_fields
 from palpate.surrogates.model_card import ModelCard, card_of
 from palpate.viewer.about_record import about_record
 from palpate.viewer.answer_check import compare_page
@@ -122,8 +123,9 @@ class _Page:
     def of(cls, surrogate: Surrogate) -> _Page:
         """Return the page of a body with as many of its fields as it has room for."""
         surrogate = _shallow(surrogate)
-        known, surrogate = [field.name for field in surrogate.fields.values()], _exported(surrogate)
-        model = PageModel(touchable(surrogate))
+        known, outline = [field.name for field in surrogate.fields.values()], _outline(surrogate)
+        surrogate = _exported(surrogate)
+        model = PageModel(touchable(surrogate), outline=outline)
         traits = device_traits("page")
         place = model.body.workspace(traits.radius)
         most = min(traits.max_force, model.body.meta.get("runtime", {}).get("max_force", math.inf))
@@ -134,7 +136,7 @@ class _Page:
             return cls._of_line(surrogate, model.body.line, hello)
         assert model.surface is not None
         # what carries the body's own surface, where there is one
-        coarse = SurfaceDrawing(model.body, detail=False)
+        coarse = SurfaceDrawing(model.body, detail=False, outline=outline)
         step = _step(np.asarray(model.surface.rest), hello)
         surface = PackedSurface.of(coarse.surface, step)
         drawn, own_parts = _pack_own_surface(model, surface, step)
@@ -242,6 +244,12 @@ def _exported(surrogate: Surrogate) -> Surrogate:
         key: field for key, field in surrogate.fields.items() if getattr(field, "contact", None) is None
     }
     return surrogate if len(fields) == len(surrogate.fields) else replace(surrogate, fields=fields)
+
+
+def _outline(surrogate: Surrogate) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the surface at rest (points, triangles) of a body between two jaws, whose fields a page does not hold."""
+    fields = list(surface_fields(surrogate.fields).values())
+    return fields[0].pictured if fields and touchable(surrogate).gripper is not None else None
 
 
 def _places(model: PageModel) -> dict[str, Any] | None:

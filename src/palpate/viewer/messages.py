@@ -68,7 +68,7 @@ __all__ = [
     "Vec3",
 ]
 
-PROTOCOL = 9  # a page of another protocol reloads itself
+PROTOCOL = 10  # a page of another protocol reloads itself
 
 Vec3 = tuple[float, float, float]
 
@@ -108,6 +108,9 @@ class Frame(Binary):
     ]
     force: Annotated[Vec3, Wire("vec3", "N, on the hand")]
     torque: Annotated[Vec3, Wire("vec3", "N m, on a tool about its place; zero where none is told")]
+    effort: Annotated[
+        float, Wire("f32", "N, with which the body pushes two jaws apart; NaN where it is unknown")
+    ]
     rate: Annotated[float, Wire("f32", "Hz, ticks per second achieved")]
     lateness: Annotated[
         float, Wire("f32", "s, the latest tick since the frame before, to a quarter of itself")
@@ -293,6 +296,9 @@ class DrawnTool:
     triangles: tuple[int, ...]  # three points each
     # parameters of `Hello` that are the rotation vector by which it is turned about its place, x y z, rad; -1 for none
     turns: tuple[int, int, int]
+    opening: int = -1  # parameter of `Hello` that is the distance of two jaws, m; -1 of one tool
+    along: Vec3 = (0.0, 0.0, 0.0)  # (3,) unit vector towards the first jaw; each moves half of the opening
+    first: int = 0  # number of the points that belong to the first jaw
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from palpate.runtime.safety import Fault
 from palpate.runtime.shared_state import State, now
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import NodeField
-from palpate.surrogates.baselines import require_one_tool
+from palpate.surrogates.grip_effort import efforts
 from palpate.surrogates.rigid_ball import pad_part_of
 from palpate.units import Range, bounds
 from palpate.viewer.about_record import about_record
@@ -69,15 +69,21 @@ class PageModel:
 
     `version` counts the surrogates of one body, where a later one takes the place of the one before. `centre` (3,) is
     the device's centre in the body's coordinates, m, by default the body's own; a later surrogate has that of the
-    first, because the loop keeps its workspace. `surface` is the body's at rest, None for one drawn as a line.
+    first, because the loop keeps its workspace. `surface` is the body's at rest, None for one drawn as a line; an
+    `outline`, points (n, 3) in m and triangles (t, 3), stands for it where no field tells it.
     """
 
-    def __init__(self, body: Touchable, version: int = 1, centre: np.ndarray | None = None) -> None:
-        require_one_tool(body.energy.baseline, "be shown on a page")
+    def __init__(
+        self,
+        body: Touchable,
+        version: int = 1,
+        centre: np.ndarray | None = None,
+        outline: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> None:
         self.body, self.version = body, version
         self.centre = body.home if centre is None else centre
         self._line = None if body.line is None else LineDrawing(body, body.line)
-        self._on_surface = SurfaceDrawing(body) if body.line is None else None
+        self._on_surface = SurfaceDrawing(body, outline=outline) if body.line is None else None
         self.surface: Surface | None = None if self._on_surface is None else self._on_surface.surface
 
     @property
@@ -116,7 +122,7 @@ class PageModel:
 
         `hand` says who moves the hand, and `device` names it in words; those are empty where it is a page's own.
         """
-        body = self.body
+        body, tool = self.body, self.body.tool or self.body.gripper
         return Hello(
             protocol=PROTOCOL,
             version=self.version,
@@ -126,7 +132,7 @@ class PageModel:
             holds=body.holds,
             radius=body.radius,
             radius_parameter=-1 if body.radius_parameter is None else body.radius_parameter,
-            tool=None if body.tool is None else drawn_tool(body.tool, body.parameters, body.shift.tolist()),
+            tool=None if tool is None else drawn_tool(tool, body.parameters, body.shift.tolist()),
             twists=body.tells_torque,
             deepest=body.deepest,
             force_max=body.force_max,
@@ -151,9 +157,17 @@ class PageModel:
 
         `loop` has the fields of `Frame` that tell of the loop and the page, whatever the body.
         """
-        drawn = self._drawing.frame(state, held, parameters[: len(self.body.energy.parameters)])
+        parameters = parameters[: len(self.body.energy.parameters)]
+        drawn = self._drawing.frame(state, held, parameters)
         felt = {"depth": state.depth, "stiffness": state.stiffness if held else 0.0}
+        felt["effort"] = self._effort(state.position, parameters) if held and state.depth > 0.0 else 0.0
         return Frame(**{"version": self.version, **_NO_TOUCH, **felt, **loop, **drawn})
+
+    def _effort(self, position: np.ndarray, parameters: np.ndarray) -> float:
+        """Return the effort of two jaws at a place (3,), N; not-a-number of one tool, and of a body that remembers."""
+        if self.body.gripper is None or self.body.memory is not None:
+            return math.nan
+        return float(efforts(self.body.energy, np.append(position, parameters)[None])[0])
 
 
 class LineDrawing:

@@ -36,11 +36,17 @@ class SurfaceDrawing:
     `surface` is at rest; `nodes` (p,) int are the field's nodes that its points stand for. All `fields` shown are on
     the nodes of the first, which is the displacement where there is one; `infos` are their names, units and ranges.
     Where the first field carries the body's own surface, that is drawn, and `nodes` are its vertices; without `detail`
-    the field's own triangles are drawn.
+    the field's own triangles are drawn. Without fields an `outline` is drawn, points (n, 3) in m and triangles (t, 3).
     """
 
-    def __init__(self, body: Touchable, *, detail: bool = True) -> None:
-        self.body, self._detail = body, detail
+    def __init__(
+        self,
+        body: Touchable,
+        *,
+        detail: bool = True,
+        outline: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> None:
+        self.body, self._detail, self._outline = body, detail, outline
         self.fields = _shown(body.fields)
         self.surface, self.nodes, self._indentation = self._at_rest()
         self._evaluators = [field.evaluator() for field in self.fields]
@@ -54,6 +60,9 @@ class SurfaceDrawing:
             first = self.fields[0]
             points, triangles = first.pictured if self._detail else (first.points, first.triangles)
             mark = touchable_triangles(self.body, first, detail=self._detail)
+        elif self._outline is not None:
+            points, triangles = self._outline
+            mark = np.zeros(len(triangles), bool)
         else:
             points, triangles = relief(self.body)
             mark = np.ones(len(triangles), bool)
@@ -97,7 +106,8 @@ class SurfaceDrawing:
         `held` says whether a hand holds or presses the body; `parameters` (p,) are the inputs that it doesn't supply.
         """
         # a field knows a ball's depth alone: whether a tool in any pose touches, the loop says
-        away = self.body.energy.baseline.name == PosedBaseline.name and state.depth <= 0.0
+        posed = isinstance(self.body.energy.baseline, PosedBaseline)
+        away = posed and state.depth <= 0.0
         touched = held and not state.let_go and not away
         deviation = self._judge.trust(state.position, parameters) if touched else 0.0
         if self.body.holds:
@@ -132,9 +142,9 @@ class SurfaceDrawing:
         return state.position
 
     def _withdrawn(self) -> np.ndarray:
-        """Where the probe is drawn after release; in the air at last."""
+        """Where the probe is drawn after release; in the air at last, where two jaws are at once."""
         left = self._depth * math.exp(-(now() - self._released) / FREE)
-        if left < STILL * self.body.deepest:
+        if left < STILL * self.body.deepest or self.body.gripper is not None:
             return self.body.away
         return self._last + (self._depth - left) * self._normal
 

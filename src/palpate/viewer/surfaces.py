@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.errors import UsageError
 from palpate.runtime.touchable import Touchable
 from palpate.surrogates import FieldSurrogate
 from palpate.viewer.messages import Surface
@@ -95,8 +96,11 @@ def touchable_triangles(body: Touchable, field: FieldSurrogate, *, detail: bool 
     """Return for each triangle (t,) of a field's surface whether it belongs to the touched surface.
 
     With `detail` the triangles are those that pictures show. These may lie beside the touched surface, which is that
-    of the elements: there the triangles count to which they are bound.
+    of the elements: there the triangles count to which they are bound. Two jaws are held by themselves, and no
+    triangle counts.
     """
+    if body.gripper is not None:
+        return np.zeros(len(field.pictured[1] if detail else field.triangles), bool)
     corners = field.points[field.triangles]
     distance, along = _beside(body, corners)
     mark = (np.abs(distance) < NEAR * body.radius) & along
@@ -120,8 +124,14 @@ def relief(body: Touchable) -> tuple[np.ndarray, np.ndarray]:
     """Return the touched surface at rest where the body was trained, points (n, 3) in m and triangles (t, 3).
 
     A grid across the normal in the middle is lowered on the zero of the surface's distance; where it does not
-    arrive, there is a hole. Where no surface is known the grid is flat.
+    arrive, there is a hole. Where no surface is known the grid is flat. A body between two jaws has none.
     """
+    if body.gripper is not None:
+        raise UsageError(
+            f"{body.name} between two jaws has no shape to draw.",
+            why="It was learnt without a field, and its surface is known near the jaws alone.",
+            fix="Learn it with its shape, or ask it in Python or by `palpate ask`.",
+        )
     across, X = _across(body.normal), body.trained_inputs
     places = np.array([body.held_place(x) for x in X[:, 3:]]) if body.holds else X[:, :3]
     middle = places.mean(axis=0) if body.holds else body.home

@@ -193,7 +193,7 @@ def require_one_tool(baseline: Baseline, what: str) -> None:
     raise UsageError(
         f"A body under a {baseline.posed_tool} can't {what} yet.",
         why="Its place is the middle between two jaws, and no point of one tool.",
-        fix="Ask it in Python or by `palpate ask`, feel it by `palpate run`, or take it as C, library or FMU.",
+        fix="Ask it in Python or by `palpate ask`, feel it by `palpate view`, or take it as C, library or FMU.",
     )
 
 

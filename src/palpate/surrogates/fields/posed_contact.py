@@ -49,5 +49,6 @@ class PosedContact:
         if isinstance(self._tool, Gripper):  # where the normals of both jaws cancel, the deepest ball's own
             faces = np.linalg.norm(normal, axis=1, keepdims=True) > LEAST_NORMAL
             normal = np.where(faces, normal, slope[np.arange(len(X)), depths.argmax(axis=1)])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        # far outside the distance has no slope
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
         return np.where(touches, size * total ** (1.0 / ORDER), depths.max(axis=1)), feet, normal

@@ -1,4 +1,4 @@
-// The three ways in which a touched body is drawn and held: a line, a surface that is pressed, a patch that is held.
+// The ways in which a touched body is drawn and held: a line, a surface that is pressed or pinched, a patch that is held.
 
 import type { Arrow } from "./arrow";
 import { NO_NEUTRAL } from "./colour";
@@ -6,11 +6,14 @@ import type { Link } from "./connection";
 import { Field, Indentation } from "./field";
 import { PullHand } from "./hand";
 import type { Hand } from "./hand";
+import { pinches } from "./hand_words";
 import { choices, largest, legend, nothing, shares, trusted } from "./legend";
 import { LineView } from "./line_view";
 import { decodeTrustMap } from "./messages";
 import type { FieldInfo, Frame, Hello, Surface, TrustMap, Vec3 } from "./messages";
 import { Panel } from "./panel";
+import { PinchHand } from "./pinch";
+import { PinchView } from "./pinch_view";
 import { PressHand } from "./press";
 import { get, parts } from "./resources";
 import { ToolShape } from "./tool_shape";
@@ -78,7 +81,7 @@ class LineBody implements Body {
 }
 
 class PressedBody implements Body {
-  readonly hand: PressHand;
+  readonly hand: PressHand | PinchHand;
   view: PressView | null = null;
   private readonly shape: ToolShape;
   private surface: Surface | null = null;
@@ -99,6 +102,10 @@ class PressedBody implements Body {
     panel: Panel,
   ) {
     this.shape = new ToolShape(hello.tool, hello.radius);
+    if (pinches(hello)) {
+      this.hand = new PinchHand(canvas, connection, hello, this.shape);
+      return;
+    }
     this.hand = new PressHand(canvas, connection, hello, this.shape);
     [this.hand.wanted, this.hand.most] = Panel.depths(hello);
     this.hand.deepened = (depth) => panel.depth(depth);
@@ -106,9 +113,16 @@ class PressedBody implements Body {
 
   async open(): Promise<void> {
     const [surface, fields, trust] = await this.load(this.hello);
-    this.view = new PressView(this.canvas, surface, this.hello, WORDS.map(element), this.shape);
+    const words = WORDS.map(element);
+    if (this.hand instanceof PinchHand) {
+      const view = new PinchView(this.canvas, surface, this.hello, words, this.shape);
+      this.hand.attach(view);
+      this.view = view;
+    } else {
+      this.view = new PressView(this.canvas, surface, this.hello, words, this.shape);
+      this.hand.attach(this.view);
+    }
     this.take(surface, fields, trust);
-    this.hand.attach(this.view);
     for (const id of ["show-ghost", "show-mesh"]) input(id).addEventListener("input", () => this.draw());
     input("show-solves").addEventListener("input", () => this.mark(this.places));
   }
@@ -121,7 +135,7 @@ class PressedBody implements Body {
         const before = this.view!; // of another mesh
         this.view = new PressView(this.canvas, surface, hello, WORDS.map(element), this.shape, before);
         before.clear();
-        this.hand.change(this.view);
+        if (this.hand instanceof PressHand) this.hand.change(this.view); // no part is learnt between jaws
         this.mark(this.places);
       }
       this.take(surface, fields, trust);
@@ -186,12 +200,13 @@ class PressedBody implements Body {
     const first = this.hello.fields[0];
     const words = first
       ? [first.components === 3 ? "displacement to scale" : "the surface is drawn at rest"]
-      : ["no field in this file: the surface is drawn at rest,", "from its distance, and does not move"];
+      : ["no field in this file: the surface is drawn at rest,", pinches(this.hello) ? "and does not move" : "from its distance, and does not move"];
     return [...words, `grid ${measured(this.view!.cell, "m")}`];
   }
 
   place(): void {
-    mark("middle", this.view!.middle(this.hello.centre), this.canvas);
+    const { view, hello } = this;
+    mark("middle", pinches(hello) ? view!.project(view!.grip) : view!.middle(hello.centre), this.canvas);
   }
 
   /** True where the colours show how well the force is known. */
@@ -223,7 +238,7 @@ class PressedBody implements Body {
     const layers = { ghost: input("show-ghost").checked, mesh: input("show-mesh").checked };
     view.touch(latest, this.shape, moved, colours, layers);
     const most = largest(info, values);
-    element("largest-note").textContent = this.trusting ? TRUST_NOTE : this.chosen === 0 && latest.grabbed ? remainder(latest.depth, most, this.hello.tool !== null) : "";
+    element("largest-note").textContent = this.trusting ? TRUST_NOTE : this.chosen === 0 && latest.grabbed ? remainder(latest.depth, most, this.hello) : "";
   }
 }
 
@@ -261,11 +276,12 @@ class PadBody implements Body {
 }
 
 /** Where the part of a press goes that does not move the body: the probe is a rigid ball or tool with a soft pad. */
-function remainder(depth: number, most: number, tool: boolean): string {
+function remainder(depth: number, most: number, hello: Hello): string {
   const rest = 1000 * (depth - most);
   if (rest < 0.005) return "";
   const deep = fixed(1000 * depth, 2);
-  return `The ${tool ? "tool" : "probe"} is ${deep} mm deep: the soft pad around it takes the other ${fixed(rest, 2)} mm.`;
+  const name = pinches(hello) ? "deeper jaw" : hello.tool ? "tool" : "probe";
+  return `The ${name} is ${deep} mm deep: the soft pad around it takes the other ${fixed(rest, 2)} mm.`;
 }
 
 /** Deviations of a map in per cent; 0 where there is none. */

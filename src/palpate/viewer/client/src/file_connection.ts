@@ -18,6 +18,8 @@ const FREE = 0.04; // s, time constant of the withdrawal that is drawn, as the s
 const STILL = 1e-3; // share of the deepest depth below which the body counts as at rest
 const NOWHERE: Vec3 = [0, 0, 0];
 const NOTHING = new Float32Array();
+const WAY = 2e-6; // m, of the difference that is the effort of two jaws
+const WEIGHTS = [[1, 8], [-1, -8], [2, -1], [-2, 1]] as const; // ways and weights of it, over 12
 
 export class FileConnection {
   connected = false;
@@ -152,6 +154,20 @@ export class FileConnection {
     return contact.map((v, k) => v + shift[k]!) as Vec3;
   }
 
+  /** The effort of two jaws, N; not-a-number of one tool, and of a body that remembers. */
+  private effort(): number {
+    const { hello, evaluator, place, parameters } = this;
+    const opening = hello.tool?.opening ?? -1;
+    if (opening < 0 || hello.remembers) return NaN;
+    let slope = 0;
+    for (const [way, weight] of WEIGHTS) {
+      const moved = Float64Array.from(parameters);
+      moved[opening]! += way * WAY;
+      slope += weight * evaluator.answer(place, moved).energy;
+    }
+    return -slope / (12 * WAY);
+  }
+
   /** Displacements (3 N) of a line's nodes, m. */
   private shape(time: number): Float32Array {
     const { line, answer } = this;
@@ -186,6 +202,7 @@ export class FileConnection {
       position: this.place,
       force: this.force,
       torque: held ? this.torque : NOWHERE,
+      effort: held && contact ? this.effort() : 0,
       rate: hello.rate, // there is no loop that could be late
       lateness: 0,
       lateness_p50: 0,

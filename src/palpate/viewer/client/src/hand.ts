@@ -137,7 +137,7 @@ export interface Handle {
 }
 
 export class PullHand extends Hand {
-  private view: Handle | null = null;
+  protected view: Handle | null = null;
   private wanted: Vec3 = [0, 0, 0]; // m, of what is held, from rest
   private gap: Vec3 = [0, 0, 0]; // from the pointer to what is held at the moment of grabbing
   private taken: Vec3 = [0, 0, 0]; // where the gamepad took hold
@@ -189,7 +189,7 @@ export class PullHand extends Hand {
       this.wanted = this.view.offset();
       this.grab();
     }
-    const size = (e.shiftKey ? SMALL_STEP : STEP) * this.hello.deepest;
+    const size = (e.shiftKey ? SMALL_STEP : STEP) * this.reach;
     const [right, up] = step.map((s) => size * s) as [number, number];
     const [x, y, z] = this.wanted;
     this.want(this.hello.line ? [x + right, y + up, z] : [x + right, y, z + up]);
@@ -207,7 +207,7 @@ export class PullHand extends Hand {
       this.padded = true;
       this.grab();
     }
-    const reach = this.hello.deepest;
+    const { reach } = this;
     const [x, y, z] = this.taken;
     const [[right, up], [, away]] = [pad.left, pad.right].map(([a, b]) => [reach * a, reach * b] as const) as [
       readonly [number, number],
@@ -216,7 +216,12 @@ export class PullHand extends Hand {
     this.want(this.hello.line ? [x + right, y + up, z] : [x + right, y + away, z + up]);
   }
 
-  private near(e: PointerEvent): boolean {
+  /** How far a gamepad's stick pulls, m. */
+  protected get reach(): number {
+    return this.hello.deepest;
+  }
+
+  protected near(e: PointerEvent): boolean {
     const at = this.view!.project(this.view!.grip);
     const limit = e.pointerType === "touch" ? NEAR_FINGER : NEAR_MOUSE;
     return Math.hypot(at.x - e.offsetX, at.y - e.offsetY) < limit;

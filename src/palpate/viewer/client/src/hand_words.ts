@@ -13,6 +13,11 @@ const FREE = {
     touch: "Nobody presses. Hold a finger on the body.",
     gamepad: "Nobody presses. Pull the right trigger.",
   },
+  pinch: {
+    mouse: "Nobody pinches. Drag the jaws, or the bright ball between them, with the mouse.",
+    touch: "Nobody pinches. Drag the jaws, or the bright ball between them, with a finger.",
+    gamepad: "Nobody pinches. Hold the right trigger and move the jaws with the sticks.",
+  },
   hold: {
     mouse: "Nobody holds the body. Drag the bright ball or pad with the mouse.",
     touch: "Nobody holds the body. Drag the bright ball or pad with a finger.",
@@ -24,6 +29,11 @@ const HELP = {
   touch: "Hold a finger on the body; the slider says how deep it goes.",
   gamepad: "The right trigger presses, the left stick moves the probe.",
 };
+
+/** True where two jaws pinch the body. */
+export function pinches(hello: Hello): boolean {
+  return (hello.tool?.opening ?? -1) >= 0;
+}
 
 const root = document.documentElement;
 let own: keyof typeof HELP = matchMedia("(hover: none) and (pointer: coarse)").matches ? "touch" : "mouse";
@@ -46,7 +56,7 @@ export function moves(hello: Hello): void {
 
 /** Nobody touches the body. */
 export function free(): string {
-  const does = mover?.holds ? "hold" : "press";
+  const does = mover?.holds ? "hold" : mover && pinches(mover) ? "pinch" : "press";
   const other = MOVERS[kind()];
   return other ? `The ${other} does not ${does === "hold" ? "hold" : "touch"} the body.` : FREE[does][own];
 }

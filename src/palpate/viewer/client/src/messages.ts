@@ -6,7 +6,7 @@ import type { Layout } from "./wire";
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 9;
+export const PROTOCOL = 10;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -65,6 +65,9 @@ export interface DrawnTool {
   normals: number[];
   triangles: number[];
   turns: [number, number, number];
+  opening: number;
+  along: Vec3;
+  first: number;
 }
 
 /** A state in words and figures. */
@@ -378,6 +381,8 @@ export interface Frame {
   force: Vec3;
   /** N m, on a tool about its place; zero where none is told */
   torque: Vec3;
+  /** N, with which the body pushes two jaws apart; NaN where it is unknown */
+  effort: number;
   /** Hz, ticks per second achieved */
   rate: number;
   /** s, the latest tick since the frame before, to a quarter of itself */
@@ -440,6 +445,7 @@ const FRAME_LAYOUT: Layout = [
   ["position", "vec3"],
   ["force", "vec3"],
   ["torque", "vec3"],
+  ["effort", "f32"],
   ["rate", "f32"],
   ["lateness", "f32"],
   ["lateness_p50", "f32"],

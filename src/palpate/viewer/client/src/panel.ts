@@ -15,7 +15,7 @@ const SAME = 1e-6; // of a range, by which its ends may differ and still be as f
 const MOST = 1.25; // so that it can be seen what lies outside
 const NUMBERS = ["force-norm", "force-x", "force-y", "force-z", "tip-x", "tip-y", "tip-z", "tip-norm"];
 const DEGREES = { size: Math.PI / 180, unit: "°" }; // people turn by degrees
-const UNKNOWN = [...NUMBERS, "torque-norm", "torque-x", "torque-y", "torque-z", "depth", "stiffness", "rate", "picture-rate"];
+const UNKNOWN = [...NUMBERS, "torque-norm", "torque-x", "torque-y", "torque-z", "effort", "depth", "stiffness", "rate", "picture-rate"];
 
 const PULLING: Places = {
   inside: "Within what it was trained on.",
@@ -137,6 +137,7 @@ export class Panel {
     const felt = frame.grabbed;
     const offset = this.hello!.line ? frame.contact : frame.position;
     put("force-norm", Math.hypot(...frame.force), 3);
+    put("effort", frame.effort, 3);
     if (this.hello!.twists) put("torque-norm", 1000 * Math.hypot(...frame.torque), 2);
     put("tip-norm", 1000 * Math.hypot(...offset), 1);
     ["x", "y", "z"].forEach((axis, k) => {
@@ -231,7 +232,7 @@ function subtitle(hello: Hello): (Node | string)[] {
 function record(frame: Frame): void {
   const data = document.documentElement.dataset;
   for (const name of ["position", "force", "torque", "contact", "parameters"] as const) data[name] = frame[name].join(" ");
-  for (const name of ["tick", "time", "grabbed", "inside", "loop", "hold", "depth", "deviation"] as const) {
+  for (const name of ["tick", "time", "effort", "grabbed", "inside", "loop", "hold", "depth", "deviation"] as const) {
     data[name] = String(frame[name]);
   }
 }

@@ -3,6 +3,7 @@
 // line    a touched body that is drawn as a line and held at a node
 // press   one that is pressed by a probe
 // pad     one that is held by a pad
+// pinch   one that two jaws pinch
 // shown   a solved body that is looked at
 // refused a part whose surface bounds no body, and may be wrapped
 // setup   a part that is set up
@@ -14,12 +15,13 @@
 import { element } from "./units";
 import type { View } from "./view";
 
-export type Mode = "line" | "press" | "pad" | "shown" | "refused" | "setup" | "work" | "answers";
+export type Mode = "line" | "press" | "pad" | "pinch" | "shown" | "refused" | "setup" | "work" | "answers";
 
 const LABELS: Record<Mode, string> = {
   line: "The body. Arrow keys pull the held end, Escape lets it go.",
   press: "The body. Hold the space bar to press, arrow keys move the probe, Page Up and Page Down change the depth.",
   pad: "The body. Arrow keys pull the pad, Escape lets it go.",
+  pinch: "The body between two jaws. Arrow keys move them, Page Down and Page Up close and open them, Escape lets go.",
   shown: "The body. Arrow keys left and right change the state, the mouse turns it.",
   refused: "No body yet: its surface is refused.",
   setup: "The body, which can be touched later.",

@@ -153,6 +153,7 @@ export class SurfaceView extends View {
       this.probe.position.set(...probe.centre);
       this.probe.scale.setScalar(probe.shape.size);
       this.probe.quaternion.copy(probe.shape.turned);
+      probe.shape.fit(this.probe.geometry);
     }
     this.wires.visible = layers.mesh;
     this.ghost.visible = this.still.visible = layers.ghost;

@@ -1,6 +1,7 @@
 // What presses a body: a ball, or a tool of any shape in its orientation.
 
 import { BufferGeometry, Float32BufferAttribute, Quaternion, SphereGeometry, Vector3 } from "three";
+import type { BufferAttribute } from "three";
 import type { DrawnTool, Vec3 } from "./messages";
 
 const STRAIGHT: Vec3 = [0, 0, 0];
@@ -9,6 +10,8 @@ const STRAIGHT: Vec3 = [0, 0, 0];
 export class ToolShape {
   /** How it is turned about its place beside its own orientation: a rotation vector, rad. */
   turn: Vec3 = STRAIGHT;
+  /** How far apart two jaws are, m. */
+  private opening = 0;
 
   constructor(
     readonly tool: DrawnTool | null,
@@ -25,6 +28,21 @@ export class ToolShape {
     geometry.setAttribute("normal", new Float32BufferAttribute(tool.normals, 3));
     geometry.setIndex([...tool.triangles]);
     return geometry;
+  }
+
+  /** Put two jaws that are drawn as `geometry` as far apart as they are. */
+  fit(geometry: BufferGeometry): void {
+    const { tool, opening } = this;
+    if (!tool || tool.opening < 0 || geometry.userData["opening"] === opening) return;
+    const position = geometry.getAttribute("position") as BufferAttribute;
+    for (let i = 0; i < position.count; i++) {
+      const half = i < tool.first ? opening / 2 : -opening / 2;
+      const [x, y, z] = tool.along.map((v, k) => tool.points[3 * i + k]! + half * v) as Vec3;
+      position.setXYZ(i, x, y, z);
+    }
+    position.needsUpdate = true;
+    geometry.computeBoundingSphere();
+    geometry.userData["opening"] = opening;
   }
 
   /** By how much `geometry` is enlarged. */
@@ -61,9 +79,10 @@ export class ToolShape {
     return this.tool.points.reduce((most, z, i) => (i % 3 === 2 ? Math.max(most, z) : most), 0);
   }
 
-  /** Take the turn out of a body's further inputs. */
+  /** Take turn and opening out of a body's further inputs. */
   follow(parameters: ArrayLike<number>): void {
     const { tool } = this;
+    if (tool) this.opening = parameters[tool.opening] ?? 0;
     if (tool) this.turn = tool.turns.map((i) => (i < 0 ? 0 : parameters[i] ?? 0)) as Vec3;
   }
 }

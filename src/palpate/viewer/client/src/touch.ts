@@ -5,6 +5,7 @@ import type { Body } from "./bodies";
 import type { Link, Listener } from "./connection";
 import { describe, say, status, warn } from "./flags";
 import { Pads } from "./gamepad";
+import { pinches } from "./hand_words";
 import { LineView } from "./line_view";
 import type { Frame, Hello, Vec3 } from "./messages";
 import { Panel } from "./panel";
@@ -79,7 +80,7 @@ export function touch({ connect, renewed = () => {}, before = () => null, seen =
       return;
     }
     element("banner").hidden = true;
-    mode(news.line ? "line" : news.holds ? "pad" : "press");
+    mode(news.line ? "line" : news.holds ? "pad" : pinches(news) ? "pinch" : "press");
     panel.start(news, {
       moved: (i, value) => {
         const values = Float32Array.from(latest?.parameters ?? []);

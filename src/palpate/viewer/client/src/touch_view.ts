@@ -31,7 +31,7 @@ export class PressView extends SurfaceView {
   constructor(
     canvas: HTMLCanvasElement,
     surface: Surface,
-    private readonly hello: Hello,
+    protected readonly hello: Hello,
     words: readonly Element[],
     shape: ToolShape,
     before: PressView | null = null,

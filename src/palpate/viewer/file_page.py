@@ -122,9 +122,8 @@ class _Page:
     @classmethod
     def of(cls, surrogate: Surrogate) -> _Page:
         """Return the page of a body with as many of its fields as it has room for."""
-        surrogate = _shallow(surrogate)
-        known, outline = [field.name for field in surrogate.fields.values()], _outline(surrogate)
-        surrogate = _exported(surrogate)
+        surrogate, outline = _shallow(surrogate), _outline(surrogate)
+        known, surrogate = [field.name for field in surrogate.fields.values()], _exported(surrogate)
         model = PageModel(touchable(surrogate), outline=outline)
         traits = device_traits("page")
         place = model.body.workspace(traits.radius)

@@ -106,7 +106,7 @@ class SurfaceDrawing:
         `held` says whether a hand holds or presses the body; `parameters` (p,) are the inputs that it doesn't supply.
         """
         # a field knows a ball's depth alone: whether a tool in any pose touches, the loop says
-        posed = isinstance(self.body.energy.baseline, PosedBaseline)
+        posed = self.body.energy.baseline.name == PosedBaseline.name or self.body.gripper is not None
         away = posed and state.depth <= 0.0
         touched = held and not state.let_go and not away
         deviation = self._judge.trust(state.position, parameters) if touched else 0.0

@@ -172,6 +172,11 @@ class Pinch(PlainInteraction):
         The lines and the ratio of both depths are a scrambled Sobol sequence; one jaw leads, and the other presses at
         most as deep. `depths` is their number in a series, by default the fourth root of the samples. Lines on which
         inputs would leave their ranges, as at the rim of a curved body, are passed over.
+
+        Raises
+        ------
+        UsageError
+            If fewer lines than are wanted go through the body.
         """
         from scipy.stats import qmc
 

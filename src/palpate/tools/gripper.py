@@ -87,7 +87,8 @@ class Gripper:
         checks.finite("The roll of a gripper", self.roll)
 
     def __str__(self) -> str:
-        jaws = f"two jaws, each a {self.jaw}" if self.mirrored else f"a {self.jaw} and a {self.far_jaw}"
+        alike = self.far_jaw == self.jaw
+        jaws = f"two jaws, each a {self.jaw}" if alike else f"a {self.jaw} and a {self.far_jaw}"
         turned = f", rolled by {math.degrees(self.roll):.3g}°" if self.roll else ""
         return f"gripper along {self.axis} of {jaws}{turned}"
 
@@ -117,11 +118,6 @@ class Gripper:
     def far_jaw(self) -> Tool:
         """The jaw on the negative side."""
         return self.jaw if self.other is None else self.other
-
-    @property
-    def mirrored(self) -> bool:
-        """True where both jaws are of one shape."""
-        return self.far_jaw == self.jaw
 
     @property
     def shape(self) -> Tool:

@@ -114,11 +114,6 @@ class PinchBaseline(PosedBaseline):
             scratch,
         )
 
-    @property
-    def c_name(self) -> str:
-        """Its own."""
-        return self.name
-
     def c_source(self) -> str:
         """Return the kernels in C99, those of a posed tool before them."""
         own = Path(__file__).with_suffix(".c").read_text("utf-8")

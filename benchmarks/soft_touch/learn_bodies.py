@@ -1,6 +1,6 @@
 """Solve the bodies of soft-touch with palpate, and learn them from few and from more of the solves.
 
-    python -m benchmarks.soft_touch.learn_bodies [--case NAME ...] [--solves 20]
+    python -m benchmarks.soft_touch.learn_bodies [--case NAME ...] [--solves 40]
 
 Writes `learnt/NAME-COUNT.palpate`, and the places and forces of the same solves in `learnt/NAME-COUNT.csv`, for all and
 for half of the solves. Places are palpate's own design over the pressed region; none is a place of the test.
@@ -21,9 +21,9 @@ from benchmarks.soft_touch.methods.palpate_surrogate import LEARNT
 
 __all__ = ["learn"]
 
-SOLVES = 20
-ELEMENT = 0.008  # m, under the ball
-EFFORT = 0.2  # of palpate's search for the energy
+SOLVES = 40
+ELEMENT = 0.005  # m, under the ball: half its radius, which is palpate's own choice
+EFFORT = 0.3  # of palpate's search for the energy
 
 
 def learn(name: str, solves: int, keep: Path) -> None:

@@ -27,7 +27,7 @@ from benchmarks.soft_touch.judge import question
 from benchmarks.soft_touch.standings import ANSWERS, METHODS, best_row
 from palpate.files import write_file
 
-__all__ = ["ask", "sweep"]
+__all__ = ["ask", "load", "main", "settings_of", "sweep"]
 
 SWEPT_PATHS = 2
 PACKAGES = {"mujoco_flex": ("mujoco",), "newton_vbd": ("newton", "warp-lang"), "force_rbf": ("scipy",)}

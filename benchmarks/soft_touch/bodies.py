@@ -22,7 +22,19 @@ from palpate.physics.shapes import Block, Dome, Inclusion, LayeredBlock, Organ
 from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.solid import Body, SolidProblem
 
-__all__ = ["BODIES", "CASES", "DEPTHS", "RADIUS", "SEED", "Path", "SoftBody", "paths_of", "problem"]
+__all__ = [
+    "BODIES",
+    "CASES",
+    "DEPTHS",
+    "RADIUS",
+    "SEED",
+    "Path",
+    "SoftBody",
+    "loops_of",
+    "paths_of",
+    "problem",
+    "touched",
+]
 
 CASES = File(__file__).parent / "cases"
 RADIUS = 0.010  # m, of the ball: a fingertip

@@ -34,10 +34,15 @@ __all__ = [
     "Case",
     "JudgeError",
     "case_names",
+    "compare",
     "delay",
     "figure_text",
     "judge",
+    "main",
+    "monotone_cubic",
+    "noticeable",
     "plain_figures",
+    "question",
     "read_case",
     "read_method",
     "table_text",
@@ -174,21 +179,12 @@ def judge(method: Any, case: Case) -> dict[str, float | None]:
 def question(method: Any, case: Case, *, loops: bool = True) -> dict[str, Any]:
     """Return what a method answers, as plain data that `compare` makes figures of.
 
-    Parameters
-    ----------
-    method : object or callable
-        Has `force(places (n, 3)) -> (n, 3)`, m and N, or is that function; or has the array `at_presses` (n, 3) alone.
-        May have `start(place)` and `step(place, seconds) -> (3,)`, or `stroke(places (n, 3)) -> (n, 3)`, a place each
-        millisecond from rest, and the numbers `solves` and `seconds_step`.
-    case : Case
-    loops : bool
-        Whether to ask for closed paths and for strokes, which take many steps.
-
-    Returns
-    -------
-    dict
-        `press` (n,), `at_presses` (n, 3), `deeper` and `shallower` (n, 3) by `PROBE_STEP` of the depth, `loop_work` in
-        %, `lateness` in ms, `seconds_step`, `solves`, `settings`; None where the method can't say.
+    The method has `force(places (n, 3)) -> (n, 3)`, m and N, or is that function; or it has the array `at_presses`
+    (n, 3) alone. It may have `start(place)` and `step(place, seconds) -> (3,)`, or `stroke(places (n, 3)) -> (n, 3)`, a
+    place each millisecond from rest, and the numbers `solves` and `seconds_step`. Closed paths and strokes, which take
+    many steps, are left out without `loops`. The answers are `press` (n,), `at_presses` (n, 3), `deeper` and
+    `shallower` (n, 3) by `PROBE_STEP` of the depth, `loop_work` in %, `lateness` in ms, `seconds_step`, `solves` and
+    `settings`; None where the method can't say.
     """
     ask = _asker(method)
     own = {name: getattr(method, name, None) for name in ("solves", "settings")}

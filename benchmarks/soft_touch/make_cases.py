@@ -24,9 +24,9 @@ from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.meshing import FineMesh
 
 from .bodies import BODIES, CASES, RADIUS, SEED
-from .places import write_places
+from .press_places import write_places
 
-__all__ = ["CASES", "make_places", "write_case"]
+__all__ = ["CASES", "main", "make_places", "write_case"]
 
 LAW = "W = shear/2 (J^(-2/3) tr(FᵀF) - 3) + bulk/2 (J - 1)^2, J = det F"
 

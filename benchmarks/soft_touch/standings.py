@@ -18,7 +18,7 @@ else:  # beside judge.py as a file
     from case_files import CASES, Case, case_names, read_case
     from judge import FIGURES, compare, figure_text
 
-__all__ = ["ANSWERS", "METHODS", "best_row", "draw", "standings", "standings_text", "sweep_rows"]
+__all__ = ["ANSWERS", "METHODS", "best_row", "draw", "sources", "standings", "standings_text", "sweep_rows"]
 
 ANSWERS = Path(__file__).parent / "answers"
 WORST = 10.0  # JND, at which the picture ends

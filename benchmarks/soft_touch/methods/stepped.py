@@ -30,16 +30,7 @@ class Simulator(Protocol):
 
 
 class SteppedBall:
-    """The method that a simulator is.
-
-    Parameters
-    ----------
-    simulator : Simulator
-    case : Case
-        The body, for the directions from which the ball comes.
-    settings : str
-        For the table.
-    """
+    """The method that a simulator is; `case` says from where the ball comes, `settings` are for the table."""
 
     solves = 0
 

@@ -16,6 +16,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
@@ -68,6 +69,14 @@ def _first_paths(case: Case, count: int) -> Case:
     return case.only([press for press, path in zip(case.presses, case.paths, strict=True) if path < count])
 
 
+def _with_oracle(blind: Case, whole: Case) -> Case:
+    """Return a case with all presses, and the oracle's forces where it has them: later ones need no asking anew."""
+    rows = [blind.presses.index(press) for press in whole.presses]
+    force = blind.force.copy()
+    force[rows] = whole.force
+    return replace(blind, force=force)
+
+
 def _rounded(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _rounded(entry) for key, entry in value.items()}
@@ -93,11 +102,12 @@ def ask(name: str, case: str, kept: dict[str, Any], options: argparse.Namespace)
     if case not in case_names() or not kept["sweep"]:
         return
     whole = read_case(case)
-    setting, asked = best_row(kept["sweep"], whole)["setting"], _first_paths(whole, options.paths)
+    setting = best_row(kept["sweep"], whole)["setting"]
+    asked = _first_paths(_with_oracle(blind, whole), options.paths)
     before = kept.get("best", {})
     fresh = before.get("setting") == setting and before["press"] == asked.presses
     if not fresh or (options.loops and "loop_work" not in before):
-        answers = question(load(name, whole, setting), asked, loops=options.loops)
+        answers = question(load(name, blind, setting), asked, loops=options.loops)
         kept["best"] = {"setting": setting, **answers}
         yield kept
 

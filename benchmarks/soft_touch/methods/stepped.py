@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any, Protocol
 
 import numpy as np
 
-__all__ = ["NEAR", "Simulator", "SteppedBall", "free_triangles", "outward"]
+__all__ = ["NEAR", "Simulator", "SteppedBall", "free_triangles", "outward", "with_mesh"]
 
 NEAR = 0.3  # of the ball's radius: to a place so near the ball goes on, to others it comes from outside
 WAY_STEPS = 8  # steps of a way, in which the ball moves evenly
@@ -88,6 +89,22 @@ class SteppedBall:
             self._last = self._advance(place)
             self._left -= self.simulator.seconds
         return self._last
+
+
+def with_mesh(case: Any, surface: float | None) -> Any:
+    """Return a case's body with elements of so many metres on its touched surface; None keeps those of its mesh."""
+    if surface is None:
+        return case
+    from ..bodies import held_points, mesh_of  # palpate's mesher: a finer mesh of the same shape is allowed
+
+    mesh = mesh_of(case.name, surface)
+    arrays = {
+        "points": mesh.points,
+        "tetrahedra": mesh.tetrahedra,
+        "label": mesh.region_of,
+        "fixed": held_points(case.name, mesh),
+    }
+    return SimpleNamespace(name=case.name, radius=case.radius, materials=case.materials, mesh=arrays)
 
 
 def free_triangles(mesh: dict[str, np.ndarray]) -> np.ndarray:

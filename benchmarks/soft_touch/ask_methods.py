@@ -32,6 +32,8 @@ __all__ = ["ask", "load", "main", "settings_of", "sweep"]
 
 SWEPT_PATHS = 2
 PACKAGES = {"mujoco_flex": ("mujoco",), "newton_vbd": ("newton", "warp-lang"), "force_rbf": ("scipy",)}
+PROBED_PATHS = 4  # whose presses a simulator is asked for stiffness: each takes it steps to rest
+LOOP_EVERY = 6  # of the 72 corners of a closed path, a simulator is asked for every sixth
 DIGITS = 6  # significant, of numbers that are kept
 
 
@@ -107,8 +109,13 @@ def ask(name: str, case: str, kept: dict[str, Any], options: argparse.Namespace)
     before = kept.get("best", {})
     fresh = before.get("setting") == setting and before["press"] == asked.presses
     if not fresh or (options.loops and "loop_work" not in before):
-        answers = question(load(name, blind, setting), asked, loops=options.loops)
+        method, probed = load(name, blind, setting), None
+        if hasattr(method, "step"):
+            probed = _first_paths(asked, PROBED_PATHS).presses
+            asked = replace(asked, loops={loop: places[::LOOP_EVERY] for loop, places in asked.loops.items()})
+        answers = question(method, asked, loops=options.loops, probed=probed)
         kept["best"] = {"setting": setting, **answers}
+        print(f"{name}, {case}: all of {method.settings}", file=sys.stderr, flush=True)
         yield kept
 
 

@@ -12,10 +12,11 @@ import numpy as np
 __all__ = ["NEAR", "Simulator", "SteppedBall", "free_triangles", "outward", "with_mesh"]
 
 NEAR = 0.3  # of the ball's radius: to a place so near the ball goes on, to others it comes from outside
-WAY_STEPS = 8  # steps of a way, in which the ball moves evenly
+WAY_STEPS = 8  # most steps of a way, in which the ball moves evenly
+WAY_STEP = 5e-4  # m, that the ball moves in one of them on a shorter way
 STEADY = 5e-3  # relative change of the force over the last steps below which the ball is at rest
 LOOK = 6  # steps over which this change is taken
-REST_STEPS = 80  # steps after which a force that still changes counts as it is
+REST_STEPS = 40  # steps after which a force that still changes counts as it is
 
 
 class Simulator(Protocol):
@@ -55,8 +56,10 @@ class SteppedBall:
         if self._place is None or np.linalg.norm(place - self._place) > NEAR * self._radius:
             self.simulator.reset()
             self._place = place + self._radius * self._outward(place)
-        for share in np.linspace(0.0, 1.0, WAY_STEPS + 1)[1:]:
-            self._advance(self._place + share * (place - self._place))
+        way = place - self._place
+        steps = min(WAY_STEPS, int(np.ceil(np.linalg.norm(way) / WAY_STEP)))
+        for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
+            self._advance(self._place + share * way)
         forces: list[np.ndarray] = []
         while len(forces) < REST_STEPS:
             forces.append(self._advance(place))

@@ -16,6 +16,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
@@ -31,6 +32,8 @@ __all__ = ["ask", "load", "main", "settings_of", "sweep"]
 
 SWEPT_PATHS = 2
 PACKAGES = {"mujoco_flex": ("mujoco",), "newton_vbd": ("newton", "warp-lang"), "force_rbf": ("scipy",)}
+PROBED_PATHS = 4  # whose presses a simulator is asked for stiffness: each takes it steps to rest
+LOOP_EVERY = 6  # of the 72 corners of a closed path, a simulator is asked for every sixth
 DIGITS = 6  # significant, of numbers that are kept
 
 
@@ -68,6 +71,14 @@ def _first_paths(case: Case, count: int) -> Case:
     return case.only([press for press, path in zip(case.presses, case.paths, strict=True) if path < count])
 
 
+def _with_oracle(blind: Case, whole: Case) -> Case:
+    """Return a case with all presses, and the oracle's forces where it has them: later ones need no asking anew."""
+    rows = [blind.presses.index(press) for press in whole.presses]
+    force = blind.force.copy()
+    force[rows] = whole.force
+    return replace(blind, force=force)
+
+
 def _rounded(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _rounded(entry) for key, entry in value.items()}
@@ -93,12 +104,18 @@ def ask(name: str, case: str, kept: dict[str, Any], options: argparse.Namespace)
     if case not in case_names() or not kept["sweep"]:
         return
     whole = read_case(case)
-    setting, asked = best_row(kept["sweep"], whole)["setting"], _first_paths(whole, options.paths)
+    setting = best_row(kept["sweep"], whole)["setting"]
+    asked = _first_paths(_with_oracle(blind, whole), options.paths)
     before = kept.get("best", {})
     fresh = before.get("setting") == setting and before["press"] == asked.presses
     if not fresh or (options.loops and "loop_work" not in before):
-        answers = question(load(name, whole, setting), asked, loops=options.loops)
+        method, probed = load(name, blind, setting), None
+        if hasattr(method, "step"):
+            probed = _first_paths(asked, PROBED_PATHS).presses
+            asked = replace(asked, loops={loop: places[::LOOP_EVERY] for loop, places in asked.loops.items()})
+        answers = question(method, asked, loops=options.loops, probed=probed)
         kept["best"] = {"setting": setting, **answers}
+        print(f"{name}, {case}: all of {method.settings}", file=sys.stderr, flush=True)
         yield kept
 
 

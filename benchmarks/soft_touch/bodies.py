@@ -7,7 +7,7 @@ has. Places follow a scrambled Sobol sequence of a seed, even over the touched p
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path as File
 from typing import Any
@@ -19,6 +19,7 @@ from palpate.physics.interactions import SphereProbe
 from palpate.physics.interactions.surface_patch import Patch, surface_of
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block, Dome, Inclusion, LayeredBlock, Organ
+from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.solid import Body, SolidProblem
 
@@ -30,7 +31,9 @@ __all__ = [
     "SEED",
     "Path",
     "SoftBody",
+    "held_points",
     "loops_of",
+    "mesh_of",
     "paths_of",
     "problem",
     "touched",
@@ -164,6 +167,21 @@ def loops_of(name: str, seed: int, count: int = 72) -> list[np.ndarray]:
         places, normals = (np.array([row[k] for row in nearest]) for k in (0, 1))
         loops.append(places + (RADIUS - depth)[:, None] * normals)
     return loops
+
+
+def mesh_of(name: str, surface: float | None = None) -> BodyMesh:
+    """Return the mesh that is shipped, or one with smaller elements, of so many metres, on the touched surface."""
+    soft = BODIES[name]
+    geometry = replace(soft.body.geometry, element=soft.coarse)  # type: ignore[type-var]
+    return geometry.rest((FineMesh(soft.touches, surface or soft.surface),))
+
+
+def held_points(name: str, mesh: BodyMesh) -> np.ndarray:
+    """Return for each point of a body's mesh whether it is held."""
+    held = np.zeros(len(mesh.points), dtype=bool)
+    for surface in BODIES[name].body.fixed:
+        held[np.unique(mesh.triangles_of(surface))] = True
+    return held
 
 
 def problem(name: str, *, depth: float = DEPTHS[1], element: float | None = None) -> SolidProblem:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .stepped import SteppedBall
+from .stepped import SteppedBall, with_mesh
 
 __all__ = ["BEST", "SETTINGS", "load"]
 
@@ -23,6 +23,11 @@ SETTINGS: tuple[dict[str, Any], ...] = (
     {"step": 5e-3, "skin": 1e-3, "stiff": True},
     {"step": 2e-3, "skin": 1e-3, "stiff": True, "damping": 0.1},
     {"step": 2e-3, "skin": 1e-3, "stiff": True, "solver": "Newton"},
+    *(
+        {"step": 2e-3, "skin": 5e-4, "stiff": stiff, "surface": surface}
+        for surface in (4e-3, 3e-3)
+        for stiff in (False, True)
+    ),
 )
 BEST: dict[str, Any] = SETTINGS[3]
 
@@ -86,8 +91,11 @@ def _model(
 def load(case: Any, **setting: Any) -> SteppedBall:
     """Return the method; `setting` is one of `SETTINGS`."""
     used = {"damping": 0.01, "solver": "CG", **(setting or BEST)}
+    surface = used.pop("surface", None)
     words = f"step {1e3 * used['step']:g} ms, skin {1e3 * used['skin']:g} mm, {used['solver']}"
     words += ", stiff contact" * used["stiff"] + f", damping {used['damping']:g} s" * (
         used["damping"] != 0.01
     )
-    return SteppedBall(_Flex(case, **used), case, words)
+    words += f", surface {1e3 * surface:g} mm" if surface else ""
+    body = with_mesh(case, surface)
+    return SteppedBall(_Flex(body, **used), body, words)

@@ -3,7 +3,8 @@
     python -m benchmarks.soft_touch.ask_methods [--method NAME ...] [--case NAME ...] [--paths 12] [--minutes 30]
 
 A sweep asks for the presses of the first two paths alone. The setting that comes nearest to the oracle there, chosen
-for each body by itself, is asked for everything else: rivals are shown at their best, which this choice flatters.
+for each body by itself, is asked for everything else: rivals are shown at their best, which this choice flatters. A
+method with `shown_of(case)`, palpate's, is shown in that setting without such a choice.
 What they answer is kept in `answers/METHOD.json` with settings, versions and the machine, case by case, so that a
 second call goes on.
 """
@@ -104,7 +105,8 @@ def ask(name: str, case: str, kept: dict[str, Any], options: argparse.Namespace)
     if case not in case_names() or not kept["sweep"]:
         return
     whole = read_case(case)
-    setting = best_row(kept["sweep"], whole)["setting"]
+    shown_of = getattr(_module(name), "shown_of", None)
+    setting = shown_of(whole) if shown_of else best_row(kept["sweep"], whole)["setting"]
     asked = _first_paths(_with_oracle(blind, whole), options.paths)
     before = kept.get("best", {})
     fresh = before.get("setting") == setting and before["press"] == asked.presses

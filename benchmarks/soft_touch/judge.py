@@ -43,6 +43,7 @@ __all__ = [
     "noticeable",
     "plain_figures",
     "question",
+    "question_moving",
     "read_case",
     "read_method",
     "table_text",
@@ -202,14 +203,18 @@ def question(
         "deeper": ask(some.shift(PROBE_STEP)).tolist(),
         "shallower": ask(some.shift(-PROBE_STEP)).tolist(),
     }
-    answers["seconds_step"] = _own_number(
-        method, "seconds_step"
-    )  # after asking: a method may count its steps
-    if loops:
-        answers["loop_work"] = _largest([_loop_work(ask, case, loop) for loop in case.loops])
-        answers["lateness"], seconds = _stroke_figures(method, ask, case)
-        answers["seconds_step"] = answers["seconds_step"] or seconds
-    return answers
+    answers["seconds_step"] = _own_number(method, "seconds_step")
+    return answers | (question_moving(method, case) if loops else {})
+
+
+def question_moving(method: Any, case: Case) -> dict[str, Any]:
+    """Return what a method with forces answers on closed paths and strokes: the part of `question` of many steps."""
+    ask = _asker(method)
+    assert ask is not None
+    work = _largest([_loop_work(ask, case, loop) for loop in case.loops])
+    lateness, seconds = _stroke_figures(method, ask, case)
+    own = _own_number(method, "seconds_step")  # after asking: a method may count its steps
+    return {"loop_work": work, "lateness": lateness, "seconds_step": own or seconds}
 
 
 def compare(answers: dict[str, Any], case: Case) -> dict[str, float | None]:

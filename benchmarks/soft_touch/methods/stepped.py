@@ -14,9 +14,9 @@ __all__ = ["NEAR", "Simulator", "SteppedBall", "free_triangles", "outward", "wit
 NEAR = 0.3  # of the ball's radius: to a place so near the ball goes on, to others it comes from outside
 WAY_STEPS = 8  # most steps of a way, in which the ball moves evenly
 WAY_STEP = 5e-4  # m, that the ball moves in one of them on a shorter way
-STEADY = 5e-3  # relative change of the force over the last steps below which the ball is at rest
+STEADY = 1e-3  # relative change of the force over the last steps below which the ball is at rest
 LOOK = 6  # steps over which this change is taken
-REST_STEPS = 40  # steps after which a force that still changes counts as it is
+REST_STEPS = 120  # steps after which a force that still changes counts as it is
 
 
 class Simulator(Protocol):

@@ -12,6 +12,8 @@ from blocks import SIZE, ball, block_mesh, dent, dents
 
 from palpate.errors import FileFormatError, UsageError
 from palpate.physics.shapes.mesh import outer_faces
+from palpate.tools import Capsule, Gripper, Sphere
+from palpate.tools.gripper import GRIP, OPENING
 from palpate.viewer import BodyViewer
 from palpate.viewer.messages import Shown, Step, Surface
 from palpate.viewer.shown_body import ShownBody, body_of
@@ -113,16 +115,25 @@ def test_files_of_other_programs_are_shown(tmp_path: Path):
             body_of(tmp_path / path)
 
 
-def solid_dataset(samples: int):
-    """Indentation of rising depth in the block as a dataset, the last row not converged."""
+GRIPPER = Gripper(Capsule(0.006, 0.018), Sphere(0.005), axis="y", roll=0.3)
+
+
+def solid_dataset(samples: int, gripper: Gripper | None = None):
+    """Indentation of rising depth in the block as a dataset, the last row not converged, as if under a ball or jaws."""
     from palpate.dataset import Layout, assemble, solid_fields
     from palpate.units import Range
 
     mesh = block_mesh()
-    ranges = tuple(Range(name, 0.0, 0.1, "m") for name in ("c_x", "c_y", "c_z"))
+    names = ("c_x", "c_y", "c_z") if gripper is None else (*GRIP, OPENING)
+    ranges = tuple(Range(name, 0.0, 0.1, "m") for name in names)
     schema = solid_fields(len(mesh.points), ranges)
     answers = {field.name: np.zeros((samples, *field.shape)) for field in schema}
     made = [dent(mesh, depth) for depth in np.linspace(0.001, 0.010, samples)]
+    places = np.array([one.centre for one in made])
+    if gripper is not None:
+        places = np.column_stack([places, np.linspace(0.09, 0.08, samples)])
+        for one, x in zip(made, places, strict=True):
+            one.tool, one.pose, one.response = gripper, x, np.append(one.response, 2.5)
     answers["displacement"] = np.array([one.displacement for one in made])
     answers["response"] = np.array([one.response for one in made])
     said = {"converged": True, "iterations": 3, "residual": 0.0, "message": "", "solve_seconds": 1.0}
@@ -131,12 +142,13 @@ def solid_dataset(samples: int):
     layout = Layout(
         mesh.points, triangles=mesh.triangles, surfaces=mesh.surfaces, surface_of=mesh.surface_of.astype(int)
     )
-    problem = {
-        "body": {"type": "Body", "fixed": ["bottom"]},
-        "interactions": [{"type": "SphereProbe", "radius": 0.010}],
-    }
-    centres = np.array([one.centre for one in made])
-    return made, assemble(ranges, layout, centres, answers, {"problem": problem}, schema=schema)
+    acting = (
+        {"type": "SphereProbe", "radius": 0.010}
+        if gripper is None
+        else {"type": "Pinch", **gripper.describe()}
+    )
+    problem = {"body": {"type": "Body", "fixed": ["bottom"]}, "interactions": [acting]}
+    return made, assemble(ranges, layout, places, answers, {"problem": problem}, schema=schema)
 
 
 def test_a_dataset_is_shown_sample_by_sample(tmp_path: Path):
@@ -154,3 +166,23 @@ def test_a_long_dataset_is_thinned_from_end_to_end(monkeypatch):
     monkeypatch.setattr("palpate.viewer.shown_body.MOST_STEPS", 3)
     _, data = solid_dataset(8)
     assert [s.label for s in body_of(data).steps] == ["sample 0", "sample 3", "sample 6"]
+
+
+def test_the_jaws_of_a_pinch_are_drawn_where_they_press():
+    made, data = solid_dataset(3, GRIPPER)
+    x = data.X[1]
+    for body, index in ((body_of(data), 1), (body_of(made[1]), 0)):
+        parts = body.split()
+        shown, step = body.shown(parts), Step.unpack(body.step(index, parts).pack())
+        assert (step.probed, step.turn) == (True, (0.0, 0.0, 0.0))
+        assert step.opening == pytest.approx(x[3], abs=1e-8)
+        points, count = np.reshape(shown.tool.points, (-1, 3)) + x[:3], shown.tool.first
+        half = x[3] / 2 * np.array(shown.tool.along)
+        for own, (tool, place) in zip(
+            (points[:count] + half, points[count:] - half), GRIPPER.solids(x), strict=True
+        ):
+            local = (own - place - tool.to_centre) @ tool.turn
+            # rounded to a tenth of a micrometre
+            np.testing.assert_allclose(tool.shape.distance(local), 0.0, atol=2e-7)
+        figures = shown.steps[index].figures
+        assert (figures["effort"], figures["opening"]) == ("2.5 N", "85.00 mm")

@@ -80,10 +80,12 @@ class Answer:
 
     def _trust(self, names: Sequence[Range]) -> str:
         where = _trust_in_words(self.inputs, names, inside=self.inside)
-        sure = (
-            "" if math.isnan(self.deviation) else f"± {share(self.deviation)} of the force, one deviation; "
-        )
-        return sure + where
+        if math.isnan(self.deviation):
+            return where
+        off = f"{share(self.deviation)} of the force"
+        if self.effort is not None:  # the forces of two jaws cancel, their error does not
+            off = f"{self.deviation * float(np.linalg.norm(self.force)):.2g} N in the force"
+        return f"± {off}, one deviation; {where}"
 
     def ended(self, deepest: float) -> Answer:
         """Return the answer at this place where the body has let go of the probe."""

@@ -122,14 +122,14 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
     if shown is None:
         raise UsageError(
             f"The field {name!r} is one at the nodes of a bent body, and the evaluator core knows fields on surfaces.",
-            fix="Export the body without a field; its force and energy are the same.",
+            fix="Take it by `palpate export c`, `lib` or `fmu`, without a field; force and energy are the same.",
         )
     if shown.contact is not None:
         raise UsageError(
             f"The field {name!r} under a tool that turns, or on a curved surface, has no exported form yet.",
             why="Where it touches follows from all balls of the tool's front, which the evaluator core takes for the "
             "energy alone.",
-            fix="Export the body without a field; its force, torque and energy are the same.",
+            fix="Take it by `palpate export c`, `lib` or `fmu`, without a field; force, torque and energy are the same.",
         )
     going, mode = shown.continuation, shown.local_mode
     assert going is not None

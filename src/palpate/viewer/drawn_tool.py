@@ -26,7 +26,7 @@ def drawn_tool(
     """
     names = [parameter.name for parameter in parameters]
     if isinstance(tool, Gripper):
-        return _drawn_jaws(tool, names.index(OPENING))
+        return _drawn_jaws(tool, names.index(OPENING) if OPENING in names else -1)
     points, normals, triangles = _posed_mesh(tool)
     x, y, z = tool.to_centre.tolist()
     a, b, c = (names.index(name) if name in names else -1 for name in ("tip_rx", "tip_ry", "tip_rz"))
@@ -48,7 +48,7 @@ def _posed_mesh(tool: PosedTool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _drawn_jaws(gripper: Gripper, opening: int) -> DrawnTool:
-    """Return two jaws that touch each other in the middle; a parameter is their opening."""
+    """Return two jaws that touch each other in the middle; a parameter, if any, is their opening."""
     first, last = (_posed_mesh(jaw) for jaw in gripper.jaws)
     points, normals = (np.concatenate([first[i], last[i]]) for i in range(2))
     x, y, z = gripper.along.tolist()

@@ -68,7 +68,7 @@ __all__ = [
     "Vec3",
 ]
 
-PROTOCOL = 10  # a page of another protocol reloads itself
+PROTOCOL = 11  # a page of another protocol reloads itself
 
 Vec3 = tuple[float, float, float]
 
@@ -211,6 +211,7 @@ class Step(Binary):
         Vec3, Wire("vec3", "rad, rotation vector that turns a tool about its place, beside its own")
     ]
     radius: Annotated[float, Wire("f32", "m, of the probe")]
+    opening: Annotated[float, Wire("f32", "m, distance of two jaws; 0 of one tool")]
     displacement: Annotated[np.ndarray, Wire("floats", "m, x y z of each point of the surface")]
     values: Annotated[
         np.ndarray, Wire("floats", "all points' values of the first of Shown.fields, then the next")
@@ -296,9 +297,9 @@ class DrawnTool:
     triangles: tuple[int, ...]  # three points each
     # parameters of `Hello` that are the rotation vector by which it is turned about its place, x y z, rad; -1 for none
     turns: tuple[int, int, int]
-    opening: int = -1  # parameter of `Hello` that is the distance of two jaws, m; -1 of one tool
+    opening: int = -1  # parameter of `Hello` that is the distance of two jaws, m; -1 for none
     along: Vec3 = (0.0, 0.0, 0.0)  # (3,) unit vector towards the first jaw; each moves half of the opening
-    first: int = 0  # number of the points that belong to the first jaw
+    first: int = 0  # number of the points that belong to the first jaw; 0 of one tool
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ import numpy as np
 
 from palpate.dataset.readers.vtk_files import Grid, read_series, read_vtu
 from palpate.errors import FileFormatError, UsageError
-from palpate.tools import PosedTool
+from palpate.tools import Gripper, PosedTool
 from palpate.viewer.drawn_tool import drawn_tool
 from palpate.viewer.messages import PROTOCOL, FieldInfo, Shown, Step, StepInfo, Surface
 from palpate.viewer.surfaces import Split, split
@@ -36,6 +36,7 @@ class ShownStep:
     values: Mapping[str, np.ndarray] = field(default_factory=dict)  # (node,) each, to colour by
     ball: tuple[np.ndarray, float] | None = None  # centre and radius of the probe, m
     turn: np.ndarray | None = None  # (3,) rotation vector that turns the tool beside its own orientation, rad
+    opening: float = 0.0  # of two jaws, m; `ball` then holds the middle between them
     label: str = ""  # beside the slider; the step's number where there is none
     figures: Mapping[str, str] = field(default_factory=dict)  # what is known of it, in words
 
@@ -50,7 +51,7 @@ class ShownBody:
     steps: Sequence[ShownStep]  # at least one
     units: Mapping[str, str] = field(default_factory=dict)  # of the steps' values
     fixed: np.ndarray | None = None  # (t,) bool, triangles that don't move
-    tool: PosedTool | None = None  # what presses where it is no ball; `ball` holds its place
+    tool: PosedTool | Gripper | None = None  # what presses where it is no ball; `ball` holds its place
 
     def __post_init__(self) -> None:
         rest, triangles = np.asarray(self.rest), np.asarray(self.triangles)
@@ -110,6 +111,7 @@ class ShownBody:
             probed=step.ball is not None,
             centre=(float(centre[0]), float(centre[1]), float(centre[2])),
             radius=float(radius),
+            opening=float(step.opening),
             turn=(0.0, 0.0, 0.0)
             if step.turn is None
             else (float(step.turn[0]), float(step.turn[1]), float(step.turn[2])),
@@ -164,27 +166,44 @@ def _step_of(solution: Any) -> ShownStep:
     fields = {VON_MISES: "von_mises", STRETCH: "largest_stretch"}
     known = {name: getattr(solution, attribute, None) for name, attribute in fields.items()}
     tool, pose = getattr(solution, "tool", None), getattr(solution, "pose", None)
-    ball = ball_of(solution, True) if tool is None or pose is None else (pose[:3], tool.shape.size)
+    placed = {"ball": ball_of(solution, True)} if tool is None or pose is None else _placed(tool, pose)
     return ShownStep(
         displacement=solution.displacement,
         values={name: values for name, values in known.items() if values is not None},
-        ball=ball,
-        turn=None if pose is None else np.append(pose[3:], np.zeros(6 - len(pose))),
         figures=_figures(
-            getattr(solution, "response", None), getattr(solution, "potential_energy", None), ball
+            getattr(solution, "response", None), getattr(solution, "potential_energy", None), **placed
         ),
+        **placed,
     )
 
 
-def _figures(response: Any, energy: Any, ball: tuple[np.ndarray, float] | None) -> dict[str, str]:
-    """Return the figures of a state in words, as far as they are known."""
+def _placed(tool: PosedTool | Gripper, pose: np.ndarray) -> dict[str, Any]:
+    """Return where a tool with inputs (3 + k,) is, as a `ShownStep` takes it."""
+    ball = (pose[:3], tool.shape.size)
+    if isinstance(tool, Gripper):
+        return {"ball": ball, "opening": float(pose[3])}
+    return {"ball": ball, "turn": np.append(pose[3:], np.zeros(6 - len(pose)))}
+
+
+def _figures(
+    response: Any,
+    energy: Any,
+    ball: tuple[np.ndarray, float] | None,
+    opening: float | None = None,
+    turn: Any = None,
+) -> dict[str, str]:
+    """Return the figures of a state in words, as far as they are known; `turn` is drawn only."""
     found: dict[str, str] = {}
+    if ball is not None and opening is not None:
+        found["opening"] = f"{1e3 * opening:.2f} mm"
+        if np.size(response) == 4:
+            found["effort"] = f"{float(np.ravel(response)[3]):.3g} N"
     if ball is not None:
         places = ", ".join(f"{1e3 * c + 0.0:.1f}" for c in ball[0].round(6))
-        found["probe"] = f"{places} mm".replace("-", "−")
+        found["probe" if opening is None else "middle"] = f"{places} mm".replace("-", "−")
     if response is not None and np.size(response) >= 3 and ball is not None:
         size = float(np.linalg.norm(np.ravel(response)[:3]))
-        found["force on the probe"] = f"{size:.3g} N"
+        found[f"force on the {'probe' if opening is None else 'jaws'}"] = f"{size:.3g} N"
     if energy is not None and math.isfinite(float(energy)):
         found["energy"] = f"{1e3 * float(energy):.3g} mJ"
     return found
@@ -236,19 +255,22 @@ def body_of_dataset(dataset: Any, name: str) -> ShownBody:
     )
 
 
-def _sample(data: Any, row: int, radius: float | None, tool: PosedTool | None) -> ShownStep:
+def _sample(data: Any, row: int, radius: float | None, tool: PosedTool | Gripper | None) -> ShownStep:
     sample = data.isel(sample=row)
     inputs = np.asarray(sample["inputs"].values, dtype=float)
-    angles = 0 if tool is None else len(tool.angles)
-    ball = (inputs[:3], radius) if radius is not None and inputs.shape == (3 + angles,) else None
+    count = 4 if isinstance(tool, Gripper) else 3 + (0 if tool is None else len(tool.angles))
+    placed: dict[str, Any] = {"ball": None}
+    if inputs.shape == (count,) and tool is not None:
+        placed = _placed(tool, inputs)
+    elif inputs.shape == (count,) and radius is not None:
+        placed = {"ball": (inputs, radius)}
     response = sample["response"].values if "response" in sample else None
     energy = sample["potential_energy"].values if "potential_energy" in sample else None
     return ShownStep(
         displacement=np.asarray(sample["displacement"].values, dtype=float),
-        ball=ball,
-        turn=np.append(inputs[3:], np.zeros(3 - angles)) if ball is not None else None,
         label=f"sample {row}",
-        figures=_figures(response, energy, ball),
+        figures=_figures(response, energy, **placed),
+        **placed,
     )
 
 
@@ -262,22 +284,19 @@ def _fixed(data: Any, origin: Any) -> np.ndarray | None:
     return np.isin(data["surface_of"].values, numbers)
 
 
-def _tool(origin: Any) -> PosedTool | None:
+def _tool(origin: Any) -> PosedTool | Gripper | None:
     """Return the tool of which a record of how a dataset was made tells."""
     acting = origin.get("problem", {}).get("interactions", ())
-    tools = [
-        PosedTool.of(one) for one in acting if isinstance(one, dict) and one.get("type") == "SurfaceTool"
-    ]
+    kinds: dict[str, Callable[..., PosedTool | Gripper]] = {"SurfaceTool": PosedTool.of, "Pinch": Gripper.of}
+    tools = [kinds[one["type"]](one) for one in acting if isinstance(one, dict) and one.get("type") in kinds]
     return tools[0] if len(tools) == 1 else None
 
 
 def _radius(record: Any) -> float | None:
-    """The radius of a sphere probe, or about that of a tool, in a record of how a dataset was made."""
+    """The radius of a sphere probe in a record of how a dataset was made."""
     if isinstance(record, dict):
         if record.get("type") == "SphereProbe":
             return float(record["radius"])
-        if record.get("type") == "SurfaceTool":
-            return PosedTool.of(record).shape.size
         record = list(record.values())
     if isinstance(record, list | tuple):
         return next((r for r in map(_radius, record) if r is not None), None)

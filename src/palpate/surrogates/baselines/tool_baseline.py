@@ -107,6 +107,6 @@ def require_ball(baseline: Baseline, what: str) -> None:
 def _needs_ball(baseline: ToolBaseline, what: str) -> UsageError:
     return UsageError(
         f"A body under {baseline.probe_words} can't {what} yet.",
-        why="The place would be taken for the centre of a ball, and it is the tool's foremost point.",
+        why="The place would be taken for the centre of a ball, and it is another point of the tool.",
         fix="Ask it in Python, feel it by `palpate run`, or learn the body under a SphereProbe.",
     )

@@ -6,7 +6,7 @@ import type { Layout } from "./wire";
 
 export type Vec3 = [number, number, number];
 
-export const PROTOCOL = 10;
+export const PROTOCOL = 11;
 
 /** The real-time process as the server sees it. */
 export const Loop = {
@@ -569,6 +569,8 @@ export interface Step {
   turn: Vec3;
   /** m, of the probe */
   radius: number;
+  /** m, distance of two jaws; 0 of one tool */
+  opening: number;
   /** m, x y z of each point of the surface */
   displacement: Float32Array;
   /** all points' values of the first of Shown.fields, then the next */
@@ -581,6 +583,7 @@ const STEP_LAYOUT: Layout = [
   ["centre", "vec3"],
   ["turn", "vec3"],
   ["radius", "f32"],
+  ["opening", "f32"],
   ["displacement", "floats"],
   ["values", "floats"],
 ];

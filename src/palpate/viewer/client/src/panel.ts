@@ -2,7 +2,7 @@
 
 import { about } from "./about";
 import { flags } from "./flags";
-import { away, moves } from "./hand_words";
+import { away, moves, pinches } from "./hand_words";
 import type { Flag, Places } from "./flags";
 import { Hold, Loop } from "./messages";
 import type { Frame, Hello, RangeInfo } from "./messages";
@@ -265,7 +265,9 @@ function trained(ranges: readonly RangeInfo[]): HTMLElement[] {
 /** The deviation of the force, in words. */
 function deviation(frame: Frame, hello: Hello): string {
   if (!frame.grabbed || (!hello.holds && frame.depth <= 0)) return "–"; // no force, no deviation
-  return Number.isNaN(frame.deviation) || !frame.inside ? "not known" : `± ${share(frame.deviation)}`;
+  if (Number.isNaN(frame.deviation) || !frame.inside) return "not known";
+  if (!pinches(hello)) return `± ${share(frame.deviation)}`;
+  return `± ${measured(frame.deviation * Math.hypot(...frame.force), "N")}`; // two jaws' forces cancel, their error does not
 }
 
 function put(id: string, value: number, decimals: number): void {

@@ -96,7 +96,7 @@ function draw(): void {
   const values = valuesOf(current, field);
   const factor = FACTORS[input("factor").valueAsNumber]!;
   const probe = current.probed && input("show-probe").checked ? { centre: current.centre, shape } : null;
-  [shape.radius, shape.turn] = [current.radius, current.turn];
+  [shape.radius, shape.turn, shape.opening] = [current.radius, current.turn, current.opening];
   const layers = { ghost: input("show-ghost").checked, mesh: input("show-mesh").checked };
   view.deform(current.displacement, factor, shares(info, values), probe, layers);
   legend(info);

@@ -11,7 +11,7 @@ export class ToolShape {
   /** How it is turned about its place beside its own orientation: a rotation vector, rad. */
   turn: Vec3 = STRAIGHT;
   /** How far apart two jaws are, m. */
-  private opening = 0;
+  opening = 0;
 
   constructor(
     readonly tool: DrawnTool | null,
@@ -33,7 +33,7 @@ export class ToolShape {
   /** Put two jaws that are drawn as `geometry` as far apart as they are. */
   fit(geometry: BufferGeometry): void {
     const { tool, opening } = this;
-    if (!tool || tool.opening < 0 || geometry.userData["opening"] === opening) return;
+    if (!tool?.first || geometry.userData["opening"] === opening) return;
     const position = geometry.getAttribute("position") as BufferAttribute;
     for (let i = 0; i < position.count; i++) {
       const half = i < tool.first ? opening / 2 : -opening / 2;

@@ -36,27 +36,15 @@ _NEARLY = 0.9  # of the wanted depth: depth series are shifted at random and end
 
 @dataclass(frozen=True, eq=False)
 class EnergyHistory:
-    """Record of the search for an energy.
+    """Record of the search for an energy."""
 
-    Attributes
-    ----------
-    trials : tuple of Trial
-        All networks that were tried, in order.
-    errors : (N,)
-        Relative force error of each solve in contact when it is left out.
-    loo : float
-        Of the mean of networks chosen: what it misses of solves left out, by closed form and refined again without
-        them, as a geometric mean.
-    meta : mapping
-        What the body's record tells of the training.
-    suspects : tuple of SuspectSolve
-        Solves that contradict their neighbours; they were learnt from like all others.
-    """
-
-    trials: tuple[Trial, ...]
-    errors: np.ndarray
+    trials: tuple[Trial, ...]  # all networks that were tried, in order
+    errors: np.ndarray  # (N,), relative force error of each solve in contact when it is left out
+    # of the mean of networks chosen: what it misses of solves left out, by closed form and refined again
+    # without them, as a geometric mean
     loo: float
-    meta: dict[str, Any]
+    meta: dict[str, Any]  # what the body's record tells of the training
+    # solves that contradict their neighbours; they were learnt from like all others
     suspects: tuple[SuspectSolve, ...] = ()
 
     def renumber(self, rows: np.ndarray) -> EnergyHistory:

@@ -13,9 +13,9 @@ from palpate.physics.shapes.shape import Isometry, Solid, mirror_isometries, rou
 
 __all__ = ["Dome", "Inclusion"]
 
-# Element over an inclusion's radius. Of half the radius, Netgen's own choice, curved elements on the ball have corners
-# where det J is a hundredth of its mean: a press of 2 mm turns them inside out.
-LARGEST = 0.4
+# Element over an inclusion's radius. Larger ones, Netgen's own half a radius among them, can have all corners on the
+# ball near its pole: once curved they are flat there, and a press of 2 mm turns them inside out.
+LARGEST = 0.35
 
 
 @dataclass(frozen=True)

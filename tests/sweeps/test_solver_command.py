@@ -129,12 +129,8 @@ def test_a_finished_sweep_starts_no_program_and_a_larger_one_only_what_is_new(tm
     np.testing.assert_array_equal(more.data["temperature"][:4], solves.data["temperature"])
 
 
-KILLS = int(os.environ.get("PALPATE_KILLS", "10"))
-"""How often the sweep is killed, by turns at its start and amidst its solves."""
-
-
 @pytest.mark.full
-def test_kills_lose_nothing(tmp_path):
+def test_twenty_kills_lose_nothing(tmp_path):
     log = tmp_path / "log.txt"
     path = heated_bar(tmp_path, samples=12, seconds=0.3, log=log)
     command = [sys.executable, "-m", "palpate", "sweep", str(path), "--workers", "2", "--json"]
@@ -147,14 +143,14 @@ def test_kills_lose_nothing(tmp_path):
         try:
             # killed by turns while the run starts, and at some time after its first program has begun, of which there
             # is one each 0.15 s
-            if kills < KILLS and kills % 2:
+            if kills < 20 and kills % 2:
                 time.sleep(rng.uniform(0.0, 1.0))
-            while kills < KILLS and not kills % 2 and process.poll() is None:
+            while kills < 20 and not kills % 2 and process.poll() is None:
                 if log.exists() and log.read_text().count("begin") > before:
                     time.sleep(rng.uniform(0.0, 0.3))
                     break
                 time.sleep(0.01)
-            if kills < KILLS and process.poll() is None:
+            if kills < 20 and process.poll() is None:
                 process.send_signal(signal.SIGKILL)
                 kills += 1
         finally:

@@ -198,14 +198,16 @@ def _under(baseline: ToolBaseline, posed: PosedTool, **more: object) -> Surrogat
     return Surrogate(energy, fields={"displacement": shown}, meta={"name": "slab"})
 
 
-def pinched_slab() -> Surrogate:
-    """The slab between two capsules that lie along y and close along x, with its displacement."""
+def pinched_slab(widest: float = 0.059) -> Surrogate:
+    """The slab between two capsules that lie along y and close along x, with its displacement; `widest` is in m."""
     described = json.dumps(Gripper(Capsule(0.005, 0.02)).describe(), sort_keys=True)
     points, triangles = box(1)
     sides = np.abs(np.ptp(points[triangles][..., 0], axis=1)) < 1e-9
     touched = TouchedSurface.of(points, triangles[sides], radius=0.005, spacing=0.0015)
     ways = {"grip_x": (-0.002, 0.002), "grip_y": (-0.006, 0.006), "grip_z": (-0.014, -0.006)}
-    inputs = tuple(Range(name, *ends, "m") for name, ends in {**ways, "grip_opening": (0.052, 0.059)}.items())
+    inputs = tuple(
+        Range(name, *ends, "m") for name, ends in {**ways, "grip_opening": (0.052, widest)}.items()
+    )
     energy = LearntEnergy(
         linear_network(
             list(inputs), [Quantity("ln U/U0")], np.array([[np.log(pressed.A), 0.1, 0.0, 0.0, 0.0]])

@@ -103,7 +103,7 @@ class Loop:
         self.swap: Swap | None = None
         self._prepare_safety(dead_man)
         self._prepare(limits, rate, stiffness, override, control)
-        self.parameters = np.array([(r.low + r.high) / 2.0 for r in model.parameters])
+        self.parameters = model.start
         self._prepare_turn(model, limits)
         self.fault, self.now, self.holding = Fault.NONE, 0.0, False
         self.device_error = ""

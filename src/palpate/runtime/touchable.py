@@ -32,6 +32,7 @@ from palpate.surrogates.moving_rest import follow
 from palpate.surrogates.tool_friction import with_friction
 from palpate.surrogates.training_record import correction_count, correction_warning
 from palpate.tools import Gripper, PosedTool
+from palpate.tools.gripper import OPENING
 from palpate.units import Range, bounds
 
 __all__ = ["FRICTION", "Touchable", "aim_device", "load_touchable", "touchable"]
@@ -74,6 +75,14 @@ class Touchable:
             return tuple(self.energy.parameters)
         # its middle, with which loop and page begin, is the body's own
         return (*self.energy.parameters, Range(FRICTION, 0.0, 2.0 * law.kinetic, ""))
+
+    @property
+    def start(self) -> np.ndarray:
+        """Values (p,) of `parameters` with which loop and page begin: the middle of their ranges, jaws at their widest.
+
+        A body that a device meets inside of it is felt only once the hand has left it, which jaws that are shut don't.
+        """
+        return np.array([r.high if r.name == OPENING else (r.low + r.high) / 2.0 for r in self.parameters])
 
     @property
     def friction(self) -> Friction | None:

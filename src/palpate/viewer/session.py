@@ -139,7 +139,7 @@ class Session:
     ) -> None:
         self.model, self.loop, self._clock = model, loop, clock
         self._hand, self._device = hand, device.partition(":")[0]
-        self._lock = HandLock(np.array([(r.low + r.high) / 2 for r in model.body.parameters]))
+        self._lock = HandLock(model.body.start)
         self._pages: dict[int, Page] = {}
         self._numbers: Iterator[int] = itertools.count(1)
         self._turns = Turns(SHORTEST, clock)

@@ -29,7 +29,7 @@ export class FileConnection {
   private force: Vec3 = NOWHERE;
   private torque: Vec3 = NOWHERE; // of the last answer, on a tool
   private answer: Answer | null = null;
-  private parameters: Float32Array;
+  private parameters: Float64Array;
   private tick = 0;
   private last = performance.now();
   private released = { at: -Infinity, depth: 0, place: NOWHERE, normal: NOWHERE };
@@ -45,7 +45,8 @@ export class FileConnection {
     private readonly rest: MovingRest | null = null,
   ) {
     this.place = [...hello.centre];
-    this.parameters = Float32Array.from(hello.parameters, ({ low, high }) => (low + high) / 2);
+    const jaws = hello.tool?.opening ?? -1; // they begin at their widest
+    this.parameters = Float64Array.from(hello.parameters, ({ low, high }, i) => (i === jaws ? high : (low + high) / 2));
     queueMicrotask(() => {
       this.connected = true;
       listener.hello(hello);
@@ -77,7 +78,10 @@ export class FileConnection {
     const elapsed = Math.min((now - this.last) / 1000, LONGEST);
     this.last = now;
     const { hand } = this;
-    if (hand?.parameters.length) this.parameters = Float32Array.from(hand.parameters);
+    const { parameters } = this.hello;
+    // an end of a range is beyond it when rounded to single precision
+    const kept = (v: number, i: number): number => Math.min(Math.max(v, parameters[i]?.low ?? v), parameters[i]?.high ?? v);
+    if (hand?.parameters.length) this.parameters = Float64Array.from(hand.parameters, kept);
     const held = hand !== null && hand.grabbed && !hand.hidden && !this.stopped;
     if (held) this.follow(this.wanted(hand.target), elapsed);
     else if (this.rest) this.lieFree(this.rest, elapsed);
@@ -219,7 +223,7 @@ export class FileConnection {
       grabbed: held,
       resting: !held,
       stalled: false,
-      parameters: this.parameters,
+      parameters: Float32Array.from(this.parameters),
       contact: touched ? this.shifted(touched.contact) : this.line ? this.nodeAt(displacement) : hello.holds ? hello.centre : NOWHERE,
       normal: touched ? touched.normal : NOWHERE,
       depth: answer ? answer.depth : 0,

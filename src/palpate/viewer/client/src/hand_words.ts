@@ -16,7 +16,7 @@ const FREE = {
   pinch: {
     mouse: "Nobody pinches. Drag the jaws, or the bright ball between them, with the mouse.",
     touch: "Nobody pinches. Drag the jaws, or the bright ball between them, with a finger.",
-    gamepad: "Nobody pinches. Hold the right trigger and move the jaws with the sticks.",
+    gamepad: "Nobody pinches. Pull the right trigger; the sticks move the jaws.",
   },
   hold: {
     mouse: "Nobody holds the body. Drag the bright ball or pad with the mouse.",

@@ -142,7 +142,7 @@ def _heights(
     near = coo_matrix((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(points),) * 2).tocsr()
     mean = diags_array(1 / np.maximum(np.asarray(near.sum(axis=1)).ravel(), 1)) @ near
     for _ in range(SPREAD):
-        height = mean @ height
+        height = np.asarray(mean @ height)
     return np.where(height > BARE * layer.height, height, 0.0)
 
 
@@ -188,4 +188,4 @@ def _split(base: np.ndarray, top: np.ndarray) -> np.ndarray:
     turned = np.tile(is_odd, 3)
     solid[turned] = solid[turned][:, [1, 0, 2, 3]]
     lifted = np.concatenate([above_c != c, above_b != b, above_a != a])
-    return solid[lifted]
+    return np.asarray(solid[lifted])

@@ -35,6 +35,7 @@ class PlainModel:
 
     def __init__(self, parameters=()):
         self.parameters = tuple(parameters)
+        self.start = np.array([(r.low + r.high) / 2.0 for r in self.parameters])
         self.answer = PlainAnswer(len(self.parameters))
 
     def evaluator(self):

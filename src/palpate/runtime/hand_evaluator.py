@@ -43,6 +43,11 @@ class Model(Protocol):
         ...
 
     @property
+    def start(self) -> np.ndarray:
+        """Their values (p,) with which the loop begins."""
+        ...
+
+    @property
     def tool_axis(self) -> np.ndarray:
         """The axis (3,) of the tool that the hand moves, a unit vector; z of any other body."""
         ...

@@ -32,7 +32,8 @@ def tables(*, quick: bool) -> list[Table]:
         save_figure(PICTURE, lambda: draw(rows))
     notes = (
         "JND: error over what a hand just notices, 7 % of the force, below 1 N 10 %",
-        "a rival's setting is the one that comes nearest on two of the paths, for each body by itself",
+        "a rival's setting is the one that comes nearest on two of the paths, for each body by itself; "
+        "palpate's is that of the most solves",
         *(_oracle_note(name) for name in case_names()),
         *(f"{title}: {source}" for title, source in sources().items()),
     )

@@ -35,8 +35,8 @@ class PlainModel:
 
     def __init__(self, parameters=()):
         self.parameters = tuple(parameters)
-        self.start = np.array([(r.low + r.high) / 2.0 for r in self.parameters])
         self.answer = PlainAnswer(len(self.parameters))
+        self.start = np.array([(each.low + each.high) / 2.0 for each in self.parameters])
 
     def evaluator(self):
         return HandEvaluator(self.answer, holds=True)

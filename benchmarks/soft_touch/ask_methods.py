@@ -3,7 +3,8 @@
     python -m benchmarks.soft_touch.ask_methods [--method NAME ...] [--case NAME ...] [--paths 12] [--minutes 30]
 
 A sweep asks for the presses of the first two paths alone. The setting that comes nearest to the oracle there, chosen
-for each body by itself, is asked for everything else: rivals are shown at their best, which this choice flatters.
+for each body by itself, is asked for everything else: rivals are shown at their best, which this choice flatters. A
+method with `shown_of(case)`, palpate's, is shown in that setting without such a choice.
 What they answer is kept in `answers/METHOD.json` with settings, versions and the machine, case by case, so that a
 second call goes on.
 """
@@ -16,6 +17,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
@@ -23,14 +25,16 @@ import numpy as np
 
 from benchmarks.machine import machine_line
 from benchmarks.soft_touch.case_files import CASES, Case, case_names, read_case
-from benchmarks.soft_touch.judge import question
+from benchmarks.soft_touch.judge import question, question_moving
 from benchmarks.soft_touch.standings import ANSWERS, METHODS, best_row
 from palpate.files import write_file
 
-__all__ = ["ask", "sweep"]
+__all__ = ["ask", "load", "main", "settings_of", "sweep"]
 
 SWEPT_PATHS = 2
 PACKAGES = {"mujoco_flex": ("mujoco",), "newton_vbd": ("newton", "warp-lang"), "force_rbf": ("scipy",)}
+PROBED_PATHS = 2  # whose presses a simulator is asked for stiffness: each takes it steps to rest
+LOOP_EVERY = 6  # of the 72 corners of a closed path, a simulator is asked for every sixth
 DIGITS = 6  # significant, of numbers that are kept
 
 
@@ -68,6 +72,14 @@ def _first_paths(case: Case, count: int) -> Case:
     return case.only([press for press, path in zip(case.presses, case.paths, strict=True) if path < count])
 
 
+def _with_oracle(blind: Case, whole: Case) -> Case:
+    """Return a case with all presses, and the oracle's forces where it has them: later ones need no asking anew."""
+    rows = [blind.presses.index(press) for press in whole.presses]
+    force = blind.force.copy()
+    force[rows] = whole.force
+    return replace(blind, force=force)
+
+
 def _rounded(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _rounded(entry) for key, entry in value.items()}
@@ -93,12 +105,25 @@ def ask(name: str, case: str, kept: dict[str, Any], options: argparse.Namespace)
     if case not in case_names() or not kept["sweep"]:
         return
     whole = read_case(case)
-    setting, asked = best_row(kept["sweep"], whole)["setting"], _first_paths(whole, options.paths)
+    shown_of = getattr(_module(name), "shown_of", None)
+    setting = shown_of(whole) if shown_of else best_row(kept["sweep"], whole)["setting"]
+    asked = _first_paths(_with_oracle(blind, whole), options.paths)
     before = kept.get("best", {})
     fresh = before.get("setting") == setting and before["press"] == asked.presses
-    if not fresh or (options.loops and "loop_work" not in before):
-        answers = question(load(name, whole, setting), asked, loops=options.loops)
-        kept["best"] = {"setting": setting, **answers}
+    moving = options.loops and not (fresh and "loop_work" in before)
+    if fresh and not moving:
+        return
+    method, probed = load(name, blind, setting), None
+    if hasattr(method, "step"):
+        probed = _first_paths(asked, PROBED_PATHS).presses
+        asked = replace(asked, loops={loop: places[::LOOP_EVERY] for loop, places in asked.loops.items()})
+    if not fresh:
+        kept["best"] = {"setting": setting, **question(method, asked, loops=False, probed=probed)}
+        print(f"{name}, {case}: all presses, {method.settings}", file=sys.stderr, flush=True)
+        yield kept
+    if moving:
+        kept["best"] |= question_moving(method, asked)
+        print(f"{name}, {case}: closed paths and strokes, {method.settings}", file=sys.stderr, flush=True)
         yield kept
 
 

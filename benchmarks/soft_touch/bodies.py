@@ -7,7 +7,7 @@ has. Places follow a scrambled Sobol sequence of a seed, even over the touched p
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path as File
 from typing import Any
@@ -19,10 +19,25 @@ from palpate.physics.interactions import SphereProbe
 from palpate.physics.interactions.surface_patch import Patch, surface_of
 from palpate.physics.materials import NeoHookean
 from palpate.physics.shapes import Block, Dome, Inclusion, LayeredBlock, Organ
+from palpate.physics.shapes.mesh import BodyMesh
 from palpate.physics.shapes.meshing import FineMesh
 from palpate.physics.solid import Body, SolidProblem
 
-__all__ = ["BODIES", "CASES", "DEPTHS", "RADIUS", "SEED", "Path", "SoftBody", "paths_of", "problem"]
+__all__ = [
+    "BODIES",
+    "CASES",
+    "DEPTHS",
+    "RADIUS",
+    "SEED",
+    "Path",
+    "SoftBody",
+    "held_points",
+    "loops_of",
+    "mesh_of",
+    "paths_of",
+    "problem",
+    "touched",
+]
 
 CASES = File(__file__).parent / "cases"
 RADIUS = 0.010  # m, of the ball: a fingertip
@@ -119,7 +134,14 @@ def touched(name: str) -> Patch:
 
 
 def paths_of(name: str, seed: int, count: int = PATHS) -> list[Path]:
-    """Return the first paths of a seed; depths are one in each fifth of the range, at a random share of it."""
+    """Return the first paths of a seed; depths are one in each fifth of the range, at a random share of it.
+
+    Those of the published seed are read from the shipped table: a place follows from the surface's triangles too, and
+    another mesher makes other ones.
+    """
+    table = CASES / name / "presses.csv"
+    if seed == SEED and count <= PATHS and table.is_file():
+        return _shipped_paths(table)[:count]
     soft, patch = BODIES[name], touched(name)
     rng = np.random.default_rng([seed, list(BODIES).index(name)])
     unit = qmc.Sobol(3, scramble=True, rng=rng).random(256)
@@ -131,6 +153,14 @@ def paths_of(name: str, seed: int, count: int = PATHS) -> list[Path]:
         Path(k, np.round(places[i], 6), normals[i], np.round(low + (high - low) * share, 6))
         for k, (i, share) in enumerate(zip(rows, shares, strict=True))
     ]
+
+
+def _shipped_paths(table: File) -> list[Path]:
+    """Return the paths of a table of presses."""
+    rows = np.loadtxt(table, delimiter=",", skiprows=1).reshape(-1, STEPS, 10)
+    centres, normals, depths = rows[:, 0, 3:6], rows[:, 0, 6:9], rows[:, :, 9]
+    places = centres - (RADIUS - depths[:, :1]) * normals
+    return [Path(k, places[k], normals[k], depths[k]) for k in range(len(rows))]
 
 
 def loops_of(name: str, seed: int, count: int = 72) -> list[np.ndarray]:
@@ -152,6 +182,21 @@ def loops_of(name: str, seed: int, count: int = 72) -> list[np.ndarray]:
         places, normals = (np.array([row[k] for row in nearest]) for k in (0, 1))
         loops.append(places + (RADIUS - depth)[:, None] * normals)
     return loops
+
+
+def mesh_of(name: str, surface: float | None = None) -> BodyMesh:
+    """Return the mesh that is shipped, or one with smaller elements, of so many metres, on the touched surface."""
+    soft = BODIES[name]
+    geometry = replace(soft.body.geometry, element=soft.coarse)  # type: ignore[type-var]
+    return geometry.rest((FineMesh(soft.touches, surface or soft.surface),))
+
+
+def held_points(name: str, mesh: BodyMesh) -> np.ndarray:
+    """Return for each point of a body's mesh whether it is held."""
+    held = np.zeros(len(mesh.points), dtype=bool)
+    for surface in BODIES[name].body.fixed:
+        held[np.unique(mesh.triangles_of(surface))] = True
+    return held
 
 
 def problem(name: str, *, depth: float = DEPTHS[1], element: float | None = None) -> SolidProblem:

@@ -160,8 +160,12 @@ def columns_of(path: Path) -> dict[str, np.ndarray]:
         raise JudgeError(f"{path} can't be read.", why=str(error)) from error
     if not rows:
         raise JudgeError(f"{path} has no rows.", fix="Give a header and a row for each press.")
+    if any(None in row or None in row.values() for row in rows):
+        raise JudgeError(
+            f"{path} has a row of another length than its header.", fix="Give each column a value."
+        )
     try:
-        return {key.strip(): np.array([float(row[key]) for row in rows]) for key in rows[0] if key}
+        return {key.strip(): np.array([float(row[key]) for row in rows]) for key in rows[0]}
     except (TypeError, ValueError) as error:
         raise JudgeError(f"{path} holds something that is no number.", why=str(error)) from error
 
@@ -173,7 +177,11 @@ def vectors_of(columns: dict[str, np.ndarray], names: str) -> np.ndarray:
 
 def order_of(presses: np.ndarray, own: np.ndarray, path: Path) -> list[int]:
     """Return the rows of a file in the order of the presses."""
+    if not np.isfinite(own).all():
+        raise JudgeError(f"{path} has a press that is no number.", fix="Number presses as presses.csv does.")
     rows = {int(press): row for row, press in enumerate(own)}
+    if len(rows) < len(own):
+        raise JudgeError(f"{path} has several rows for one press.", fix="Give one row for each press.")
     missing = [int(press) for press in presses if int(press) not in rows]
     if missing:
         raise JudgeError(

@@ -17,7 +17,7 @@ import json
 import math
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -34,10 +34,16 @@ __all__ = [
     "Case",
     "JudgeError",
     "case_names",
+    "compare",
     "delay",
     "figure_text",
     "judge",
+    "main",
+    "monotone_cubic",
+    "noticeable",
     "plain_figures",
+    "question",
+    "question_moving",
     "read_case",
     "read_method",
     "table_text",
@@ -152,7 +158,7 @@ def read_method(path: Path, case: Case) -> Any:
         method = module.load(case)
     except JudgeError:
         raise
-    except Exception as error:  # whatever a stranger's file raises is named with its file
+    except (Exception, SystemExit) as error:  # whatever a stranger's file raises is named with its file
         raise JudgeError(
             f"{path} can't be loaded for the case {case.name}.",
             why=f"{type(error).__name__}: {error}",
@@ -171,59 +177,74 @@ def judge(method: Any, case: Case) -> dict[str, float | None]:
     return compare(question(method, case), case)
 
 
-def question(method: Any, case: Case, *, loops: bool = True) -> dict[str, Any]:
+def question(
+    method: Any, case: Case, *, loops: bool = True, probed: Sequence[int] | None = None
+) -> dict[str, Any]:
     """Return what a method answers, as plain data that `compare` makes figures of.
 
-    Parameters
-    ----------
-    method : object or callable
-        Has `force(places (n, 3)) -> (n, 3)`, m and N, or is that function; or has the array `at_presses` (n, 3) alone.
-        May have `start(place)` and `step(place, seconds) -> (3,)`, or `stroke(places (n, 3)) -> (n, 3)`, a place each
-        millisecond from rest, and the numbers `solves` and `seconds_step`.
-    case : Case
-    loops : bool
-        Whether to ask for closed paths and for strokes, which take many steps.
-
-    Returns
-    -------
-    dict
-        `press` (n,), `at_presses` (n, 3), `deeper` and `shallower` (n, 3) by `PROBE_STEP` of the depth, `loop_work` in
-        %, `lateness` in ms, `seconds_step`, `solves`, `settings`; None where the method can't say.
+    The method has `force(places (n, 3)) -> (n, 3)`, m and N, or is that function; or it has the array `at_presses`
+    (n, 3) alone. It may have `start(place)` and `step(place, seconds) -> (3,)`, or `stroke(places (n, 3)) -> (n, 3)`, a
+    place each millisecond from rest, and the numbers `solves` and `seconds_step`. Closed paths and strokes, which take
+    many steps, are left out without `loops`. The answers are `press` (n,), `at_presses` (n, 3), `deeper` and
+    `shallower` (m, 3) by `PROBE_STEP` of the depth at the presses `probed` (m,), all by default, `loop_work` in %,
+    `lateness` in ms, `seconds_step`, `solves` and `settings`; None where the method can't say.
     """
     ask = _asker(method)
-    own = {name: getattr(method, name, None) for name in ("solves", "settings")}
+    own = {"solves": _own_number(method, "solves"), "settings": getattr(method, "settings", None)}
     if ask is None:
-        own["seconds_step"] = getattr(method, "seconds_step", None)
+        own["seconds_step"] = _own_number(method, "seconds_step")
         return {**own, "press": case.presses, "at_presses": method.at_presses.tolist()}
+    some = case if probed is None else case.only(probed)
     answers = {
         **own,
         "press": case.presses,
         "at_presses": ask(case.places).tolist(),
-        "deeper": ask(case.shift(PROBE_STEP)).tolist(),
-        "shallower": ask(case.shift(-PROBE_STEP)).tolist(),
+        "probed": some.presses,
+        "deeper": ask(some.shift(PROBE_STEP)).tolist(),
+        "shallower": ask(some.shift(-PROBE_STEP)).tolist(),
     }
-    answers["seconds_step"] = getattr(
-        method, "seconds_step", None
-    )  # after asking: a method may count its steps
-    if loops:
-        answers["loop_work"] = _largest([_loop_work(ask, case, loop) for loop in case.loops])
-        answers["lateness"], seconds = _stroke_figures(method, ask, case)
-        answers["seconds_step"] = answers["seconds_step"] or seconds
-    return answers
+    answers["seconds_step"] = _own_number(method, "seconds_step")
+    return answers | (question_moving(method, case) if loops else {})
+
+
+def question_moving(method: Any, case: Case) -> dict[str, Any]:
+    """Return what a method with forces answers on closed paths and strokes: the part of `question` of many steps."""
+    ask = _asker(method)
+    assert ask is not None
+    work = _largest([_loop_work(ask, case, loop) for loop in case.loops])
+    lateness, seconds = _stroke_figures(method, ask, case)
+    own = _own_number(method, "seconds_step")  # after asking: a method may count its steps
+    return {"loop_work": work, "lateness": lateness, "seconds_step": own or seconds}
 
 
 def compare(answers: dict[str, Any], case: Case) -> dict[str, float | None]:
     """Return the figures of answers to presses that the oracle has; one without a finite force is infinitely wrong."""
-    rows = [row for row, press in enumerate(answers["press"]) if press in set(case.presses)]
-    asked = case.only([answers["press"][row] for row in rows])
+    rows, asked = _solved(answers["press"], case)
     figures: dict[str, float | None] = dict.fromkeys(FIGURES)
     figures |= _force_figures(np.array(answers["at_presses"], dtype=float)[rows], asked)
     if answers.get("deeper") is not None:
+        rows, asked = _solved(answers.get("probed", answers["press"]), case)
         deeper, shallower = (np.array(answers[name], dtype=float)[rows] for name in ("deeper", "shallower"))
         figures["stiffness_median"] = _stiffness_error(deeper, shallower, asked)
     for name in ("loop_work", "lateness", "seconds_step", "solves"):
         figures[name] = answers.get(name)
     return figures
+
+
+def _own_number(method: Any, name: str) -> float | None:
+    """Return a number that a method says of itself, None where it says nothing."""
+    value = getattr(method, name, None)
+    if value is not None and (isinstance(value, str) or not np.isscalar(value) or not np.isreal(value)):
+        raise JudgeError(
+            f"{name} of the method is {value!r}, no number.", fix="Give a number, or leave it out."
+        )
+    return None if value is None else float(value)
+
+
+def _solved(presses: list[int], case: Case) -> tuple[list[int], Case]:
+    """Return the rows of presses that the oracle has, and the case with these alone."""
+    rows = [row for row, press in enumerate(presses) if press in set(case.presses)]
+    return rows, case.only([presses[row] for row in rows])
 
 
 def _asker(method: Any) -> Callable[[np.ndarray], np.ndarray] | None:
@@ -234,9 +255,12 @@ def _asker(method: Any) -> Callable[[np.ndarray], np.ndarray] | None:
 def _ask(call: Callable[..., Any], places: np.ndarray, *rest: float) -> np.ndarray:
     """Return the forces of a stranger's function at places (n, 3) or at one (3,), in the same shape."""
     try:
-        forces = np.asarray(call(places.copy(), *rest), dtype=float)
+        answer = np.asarray(call(places.copy(), *rest))
+        forces = answer if np.iscomplexobj(answer) else answer.astype(float)
     except Exception as error:  # a stranger's method may raise anything
         raise JudgeError("The method raised an error.", why=f"{type(error).__name__}: {error}") from error
+    if np.iscomplexobj(forces):
+        raise JudgeError("The method answered by complex numbers.", fix="Return real forces in N.")
     if forces.shape != places.shape:
         raise JudgeError(
             f"The method answered places of shape {places.shape} by an array of shape {forces.shape}.",
@@ -411,6 +435,13 @@ def plain_figures(figures: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def _all_cases(folder: Path) -> list[str]:
+    names = case_names(folder)
+    if not names:
+        raise JudgeError(f"{folder} holds no case.", fix="Give a folder with NAME/oracle.csv.")
+    return names
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Judge a method from the command line."""
     parser = argparse.ArgumentParser(prog="judge.py", description=(__doc__ or "").split("\n", 1)[0])
@@ -421,7 +452,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         results = {}
-        for name in options.case or case_names(options.cases):
+        for name in options.case or _all_cases(options.cases):
             case = read_case(name, options.cases)
             results[name] = judge(read_method(options.method, case), case)
     except JudgeError as error:
@@ -430,7 +461,11 @@ def main(arguments: list[str] | None = None) -> int:
     print(table_text(results))
     if options.json:
         plain = {name: plain_figures(figures) for name, figures in results.items()}
-        options.json.write_text(json.dumps(plain, indent=2, allow_nan=False) + "\n", "utf-8")
+        try:
+            options.json.write_text(json.dumps(plain, indent=2, allow_nan=False) + "\n", "utf-8")
+        except OSError as error:
+            print(f"{options.json} can't be written: {error}", file=sys.stderr)
+            return 2
     return 0
 
 

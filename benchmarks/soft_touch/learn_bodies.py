@@ -19,7 +19,7 @@ import palpate as pp
 from benchmarks.soft_touch.bodies import BODIES, problem
 from benchmarks.soft_touch.methods.palpate_surrogate import LEARNT
 
-__all__ = ["learn"]
+__all__ = ["learn", "main"]
 
 SOLVES = 40
 ELEMENT = 0.005  # m, under the ball: half its radius, which is palpate's own choice

@@ -14,31 +14,27 @@ import shutil
 import sys
 import time
 from collections import deque
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path as File
 
 import numpy as np
 
 from palpate.physics.shapes.mesh import BodyMesh
-from palpate.physics.shapes.meshing import FineMesh
 
-from .bodies import BODIES, CASES, RADIUS, SEED
-from .places import write_places
+from .bodies import BODIES, CASES, RADIUS, SEED, held_points, mesh_of
+from .press_places import write_places
 
-__all__ = ["CASES", "make_places", "write_case"]
+__all__ = ["CASES", "main", "make_places", "write_case"]
 
 LAW = "W = shear/2 (J^(-2/3) tr(FᵀF) - 3) + bulk/2 (J - 1)^2, J = det F"
 
 
 def write_case(name: str, folder: File) -> None:
     """Write a body's card and mesh."""
-    soft = BODIES[name]
     folder.mkdir(parents=True, exist_ok=True)
-    geometry = replace(soft.body.geometry, element=soft.coarse)  # type: ignore[type-var]
-    mesh = geometry.rest((FineMesh(soft.touches, soft.surface),))
+    mesh = mesh_of(name)
     (folder / "case.toml").write_text(_card(name, mesh), "utf-8")
-    _write_mesh(mesh, folder / "mesh.vtu", soft.body.fixed)
+    _write_mesh(mesh, held_points(name, mesh), folder / "mesh.vtu")
 
 
 def make_places(name: str, seed: int, folder: File) -> None:
@@ -82,11 +78,8 @@ def _card(name: str, mesh: BodyMesh) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _write_mesh(mesh: BodyMesh, file: File, fixed: Iterable[str]) -> None:
+def _write_mesh(mesh: BodyMesh, held: np.ndarray, file: File) -> None:
     """Write tetrahedra as a VTU file in words, which a reader of twenty lines can read."""
-    held = np.zeros(len(mesh.points), dtype=int)
-    for surface in fixed:
-        held[np.unique(mesh.triangles_of(surface))] = 1
     nodes, cells = len(mesh.points), len(mesh.tetrahedra)
     point = "\n".join(" ".join(f"{value:.7g}" for value in row) for row in mesh.points)
     corners = "\n".join(" ".join(map(str, row)) for row in mesh.tetrahedra.tolist())
@@ -104,7 +97,7 @@ def _write_mesh(mesh: BodyMesh, file: File, fixed: Iterable[str]) -> None:
 {" ".join(["10"] * cells)}
 </DataArray></Cells>
 <PointData><DataArray type="Int32" Name="fixed" format="ascii">
-{" ".join(map(str, held.tolist()))}
+{" ".join(map(str, held.astype(int).tolist()))}
 </DataArray></PointData>
 <CellData><DataArray type="Int32" Name="label" format="ascii">
 {" ".join(map(str, mesh.region_of.tolist()))}

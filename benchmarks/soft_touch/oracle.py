@@ -27,7 +27,7 @@ from palpate.physics.solid import SolidProblem
 
 from .bodies import BODIES, CASES, DEPTHS, RADIUS, SEED, STEPS, Path, paths_of
 
-__all__ = ["fine_problem", "read_solves", "solve_calculix", "solve_paths", "write_oracle"]
+__all__ = ["fine_problem", "read_solves", "solve_calculix", "solve_path", "solve_paths", "write_oracle"]
 
 ELEMENT = 0.0025  # m, elements under the ball: 0.8 of the narrowest contact's radius
 FINER = 0.7  # size of the finer elements over that: twice the unknowns

@@ -18,7 +18,7 @@ else:  # beside judge.py as a file
     from case_files import CASES, Case, case_names, read_case
     from judge import FIGURES, compare, figure_text
 
-__all__ = ["ANSWERS", "METHODS", "best_row", "draw", "standings", "standings_text", "sweep_rows"]
+__all__ = ["ANSWERS", "METHODS", "best_row", "draw", "sources", "standings", "standings_text", "sweep_rows"]
 
 ANSWERS = Path(__file__).parent / "answers"
 WORST = 10.0  # JND, at which the picture ends
@@ -129,16 +129,18 @@ def draw(rows: list[dict[str, Any]]) -> Any:
     titles = list(dict.fromkeys(row["method"] for row in rows))[::-1]
     figure = Figure(figsize=(1.8 * len(cases) + 2.2, 0.35 * len(titles) + 1.2), layout="constrained")
     panels = figure.subplots(1, len(cases), sharex=True, sharey=True, squeeze=False)[0]
+    longest = 0.0
     for panel, case in zip(panels, cases, strict=True):
         for row in rows:
             if row["case"] == case and row["jnd_median"] is not None:
                 place = titles.index(row["method"])
                 ends = [min(row[key], WORST) for key in ("jnd_median", "jnd_p95")]
+                longest = max(longest, *ends)
                 panel.plot(ends, [place, place], color="C0", linewidth=2.0)
                 panel.plot(ends[:1], [place], "o", color="C0")
         panel.axvline(1.0, color="0.4", linewidth=0.8, linestyle="--")
         panel.set(title=case)
-        panel.set_xlim(left=0.0)
+    panels[0].set_xlim(0.0, 1.05 * max(longest, 1.0))
     panels[0].set_yticks(range(len(titles)), titles)
     panels[0].set_ylim(-0.5, len(titles) - 0.5)
     figure.supxlabel("force error, JND: median to 95th percentile", fontsize=9)

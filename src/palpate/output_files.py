@@ -120,7 +120,7 @@ def require_outputs(
             raise UsageError(
                 f"The folder {around} does not exist.",
                 why=f"{path if place is None else place} goes into it.",
-                fix="Make it first, or choose another place with --out.",
+                fix="Make it first, or choose another place.",
             )
         require_regular(path)
         if path.exists():
@@ -133,7 +133,7 @@ def _require_own(path: Path, inputs: Iterable[str | os.PathLike[str]], *, overwr
         raise UsageError(
             f"{path} is a file that is read here.",
             why="What is written would take its place.",
-            fix="Choose another name with --out.",
+            fix="Choose another name.",
         )
     marked = is_marked(path)
     if is_own(path) or (overwrite and marked):
@@ -142,12 +142,12 @@ def _require_own(path: Path, inputs: Iterable[str | os.PathLike[str]], *, overwr
         raise UsageError(
             f"{path} exists already.",
             why="It is a table, or was changed after palpate wrote it.",
-            fix="Choose another name with --out, or replace it with --force (in Python overwrite=True).",
+            fix="Choose another name, or replace it with --force (in Python overwrite=True).",
         )
     raise UsageError(
         f"{path} exists already, and palpate did not write it.",
         why="Files of others are never replaced, with --force neither.",
-        fix="Choose another name with --out, or remove the file yourself.",
+        fix="Choose another name, or remove the file yourself.",
     )
 
 

@@ -118,8 +118,12 @@ class Sitting:
     def _stiffness(self) -> dict[int, float] | None:
         """The stiffness of both bodies at the depth at which they were seen most alike; None where there is none."""
         first, second = (
-            [(depth, force) for depth, force in bars if depth > _SEEN and 0.0 < force < 100.0]
-            for bars in self.page.evaluate("window.bars")
+            [
+                (depth, force)
+                for depth, force in bars[len(bars) // 2 :]
+                if depth > _SEEN and 0.0 < force < 100.0
+            ]
+            for bars in self.page.evaluate("window.bars")  # the force ramps in at first
         )
         pairs = [(a, b) for a in first for b in second]
         if not pairs:

@@ -10,8 +10,8 @@ import pytest
 from palpate.errors import UsageError
 from palpate.learning.lumps import LumpPresses, learn_lumps
 from palpate.learning.lumps.learn_lumps import _curvature, change_errors
-from palpate.surrogates.lumps import LumpRoom
 from palpate.surrogates.lumps.lump_contrast import closed_form
+from palpate.surrogates.lumps.lump_room import LumpRoom
 from palpate.units import Range
 from palpate.validation.figures.contrast_error import contrast_error
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.surrogates.lumps import LumpContrast, LumpRoom
+from palpate.surrogates.lumps import LumpContrast
 from palpate.surrogates.lumps.gaussian_sum import GaussianSum
-from palpate.surrogates.lumps.lump_room import skin_of
+from palpate.surrogates.lumps.lump_room import LumpRoom, skin_of
 from palpate.units import Range, bounds
 from surrogates.touch_made import BOX
 

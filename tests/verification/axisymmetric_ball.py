@@ -45,39 +45,50 @@ def forces(
     young: float, poisson: float, radius: float, width: float, height: float, depths: list[float]
 ) -> np.ndarray:
     """Force on the ball in N at each depth in m, from shallow to deep."""
-    mesh = mesh_of(width, height, radius)
+    mu, lame = young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))
+
+    def law(squares, volume):
+        return mu / 2 * (squares - 3) - mu * ngs.log(volume) + lame / 2 * ngs.log(volume) ** 2
+
+    scale = young / (1 - poisson**2) / math.sqrt(radius)
+    pads = [[rung * scale / math.sqrt(depth) for rung in LADDER] for depth in depths]
+    pushes = press(mesh_of(width, height, radius), law, radius, height, depths, pads)
+    ratio = LADDER[-1] / LADDER[-2]
+    return (ratio * pushes[:, -1] - pushes[:, -2]) / (ratio - 1)
+
+
+def press(
+    mesh: ngs.Mesh, law, radius: float, height: float, depths: list[float], pads: list[list[float]]
+) -> np.ndarray:
+    """Force in N under each pad in N/m³ at each depth in m below a height, (depth, pad), from shallow to deep.
+
+    `law` gives the energy from the sum of the squares of F's entries and the ratio of volumes.
+    """
     free_axis = ngs.H1(mesh, order=ORDER, dirichlet="bottom|axis")
     space = free_axis * ngs.H1(mesh, order=ORDER, dirichlet="bottom")
     (u, w), state = space.TrialFunction(), ngs.GridFunction(space)
-    mu, lame = young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))
     hoop = 1 + u / x
     a, b, c, d = 1 + grad(u)[0], grad(u)[1], grad(w)[0], 1 + grad(w)[1]
-    volume = hoop * (a * d - b * c)
-    law = (
-        mu / 2 * (a**2 + b**2 + c**2 + d**2 + hoop**2 - 3)
-        - mu * ngs.log(volume)
-        + lame / 2 * ngs.log(volume) ** 2
-    )
+    energy = law(a**2 + b**2 + c**2 + d**2 + hoop**2, hoop * (a * d - b * c))
     centre, penalty = ngs.Parameter(0.0), ngs.Parameter(0.0)
     gap = radius - sqrt((x + u) ** 2 + (y + w - centre) ** 2 + 1e-18)
     pressed = ngs.IfPos(gap, penalty / 2 * gap**2, 0)
     form = ngs.BilinearForm(space, symmetric=True)
-    form += ngs.Variation((2 * math.pi * x * law).Compile() * ngs.dx)
+    form += ngs.Variation((2 * math.pi * x * energy).Compile() * ngs.dx)
     form += ngs.Variation((2 * math.pi * x * pressed).Compile() * ngs.ds("under", bonus_intorder=6))
     answers = []
-    for depth in depths:
+    for depth, stiffnesses in zip(depths, pads, strict=True):
         centre.Set(height + radius - depth)
-        scale = young / (1 - poisson**2) / math.sqrt(radius * depth)
-        pushes = []
-        for rung in LADDER:
-            penalty.Set(rung * scale)
+        answers.append([])
+        for stiffness in stiffnesses:
+            penalty.Set(stiffness)
             _equilibrate(form, space, state)
             across, up = state.components
             far = sqrt((x + across) ** 2 + (y + up - centre) ** 2)
             push = ngs.IfPos(radius - far, penalty * (radius - far) * (centre - y - up) / far, 0)
-            pushes.append(ngs.Integrate(2 * math.pi * x * push * ngs.ds("under", bonus_intorder=6), mesh))
-        ratio = LADDER[-1] / LADDER[-2]
-        answers.append((ratio * pushes[-1] - pushes[-2]) / (ratio - 1))
+            answers[-1].append(
+                ngs.Integrate(2 * math.pi * x * push * ngs.ds("under", bonus_intorder=6), mesh)
+            )
     return np.array(answers)
 
 

@@ -50,6 +50,12 @@ def deck(
     lines = [*block(across, across, down), *cap(ball)]
     lines += contact(law, PENALTY * young / KILO / ball)
     lines += ["*BOUNDARY", "BOTTOM, 1, 3", "XSIDE, 1, 1", "YSIDE, 2, 2", "TOOLNODES, 1, 2"]
+    return "\n".join([*lines, *steps(depths)]) + "\n"
+
+
+def steps(depths: list[float]) -> list[str]:
+    """Steps in which the ball goes to depths in m from shallow to deep."""
+    lines = []
     for depth in depths:
         lines += [
             "*STEP, NLGEOM, INC=200",
@@ -61,7 +67,7 @@ def deck(
             "RF",
             "*END STEP",
         ]
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def forces(text: str) -> np.ndarray:

@@ -86,7 +86,7 @@ class CountedSession(Session):
 
     def __init__(self, loop: VirtualTime) -> None:
         shared = SimpleNamespace(read_state=lambda: None, write_command=lambda **_: None)
-        model = SimpleNamespace(body=SimpleNamespace(parameters=[]), version=1)
+        model = SimpleNamespace(body=SimpleNamespace(parameters=[], start=np.zeros(0)), version=1)
         super().__init__(model, SimpleNamespace(shared=shared, alive=True, rate=1e3), clock=loop.time)
         self.virtual, self.begun, self.taken, self.late, self.tasks = loop, [], {}, [], []
 

@@ -9,12 +9,14 @@ import numpy as np
 
 from benchmarks.massspring import MassSpringBody
 
-from .stepped import NEAR, free_triangles
+from .stepped import NEAR, free_triangles, with_mesh
 
 __all__ = ["BEST", "SETTINGS", "load"]
 
-SETTINGS: tuple[dict[str, Any], ...] = tuple(
-    {"pad": pad, "volume": volume} for volume in (True, False) for pad in (2e6, 1e7)
+SETTINGS: tuple[dict[str, Any], ...] = (
+    *({"pad": pad, "volume": volume} for volume in (True, False) for pad in (2e6, 1e7)),
+    {"pad": 5e7, "volume": True},
+    *({"pad": 1e7, "volume": True, "surface": surface} for surface in (4e-3, 3e-3)),
 )
 BEST: dict[str, Any] = SETTINGS[1]
 
@@ -70,4 +72,8 @@ def _triangles_within(tetrahedra: np.ndarray, chosen: np.ndarray) -> np.ndarray:
 
 def load(case: Any, **setting: Any) -> _Springs:
     """Return the method; `setting` is one of `SETTINGS`."""
-    return _Springs(case, **(setting or BEST))
+    used = dict(setting or BEST)
+    surface = used.pop("surface", None)
+    method = _Springs(with_mesh(case, surface), **used)
+    method.settings += f", surface {1e3 * surface:g} mm" if surface else ""
+    return method

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["LEARNT", "load", "settings_of"]
+__all__ = ["LEARNT", "load", "settings_of", "shown_of"]
 
 LEARNT = Path(__file__).parents[1] / "learnt"
 
@@ -27,6 +27,11 @@ def settings_of(case: Any) -> list[dict[str, Any]]:
     """Return the numbers of solves that the body was learnt from, fewest first."""
     counts = sorted(int(path.stem.rpartition("-")[2]) for path in LEARNT.glob(f"{case.name}-*.palpate"))
     return [{"solves": count} for count in counts]
+
+
+def shown_of(case: Any) -> dict[str, Any]:
+    """Return the setting of the most solves: what the benchmark's own project shows is not chosen at test places."""
+    return settings_of(case)[-1]
 
 
 def load(case: Any, solves: int | None = None) -> _Learnt:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any, Protocol
 
 import numpy as np
 
-__all__ = ["NEAR", "Simulator", "SteppedBall", "free_triangles", "outward"]
+__all__ = ["NEAR", "Simulator", "SteppedBall", "free_triangles", "outward", "with_mesh"]
 
 NEAR = 0.3  # of the ball's radius: to a place so near the ball goes on, to others it comes from outside
-WAY_STEPS = 8  # steps of a way, in which the ball moves evenly
-STEADY = 5e-3  # relative change of the force over the last steps below which the ball is at rest
+WAY_STEPS = 8  # most steps of a way, in which the ball moves evenly
+WAY_STEP = 5e-4  # m, that the ball moves in one of them on a shorter way
+STEADY = 1e-3  # relative change of the force over the last steps below which the ball is at rest
 LOOK = 6  # steps over which this change is taken
-REST_STEPS = 80  # steps after which a force that still changes counts as it is
+REST_STEPS = 120  # steps after which a force that still changes counts as it is
 
 
 class Simulator(Protocol):
@@ -30,16 +32,7 @@ class Simulator(Protocol):
 
 
 class SteppedBall:
-    """The method that a simulator is.
-
-    Parameters
-    ----------
-    simulator : Simulator
-    case : Case
-        The body, for the directions from which the ball comes.
-    settings : str
-        For the table.
-    """
+    """The method that a simulator is; `case` says from where the ball comes, `settings` are for the table."""
 
     solves = 0
 
@@ -63,8 +56,10 @@ class SteppedBall:
         if self._place is None or np.linalg.norm(place - self._place) > NEAR * self._radius:
             self.simulator.reset()
             self._place = place + self._radius * self._outward(place)
-        for share in np.linspace(0.0, 1.0, WAY_STEPS + 1)[1:]:
-            self._advance(self._place + share * (place - self._place))
+        way = place - self._place
+        steps = min(WAY_STEPS, int(np.ceil(np.linalg.norm(way) / WAY_STEP)))
+        for share in np.linspace(0.0, 1.0, steps + 1)[1:]:
+            self._advance(self._place + share * way)
         forces: list[np.ndarray] = []
         while len(forces) < REST_STEPS:
             forces.append(self._advance(place))
@@ -97,6 +92,22 @@ class SteppedBall:
             self._last = self._advance(place)
             self._left -= self.simulator.seconds
         return self._last
+
+
+def with_mesh(case: Any, surface: float | None) -> Any:
+    """Return a case's body with elements of so many metres on its touched surface; None keeps those of its mesh."""
+    if surface is None:
+        return case
+    from ..bodies import held_points, mesh_of  # palpate's mesher: a finer mesh of the same shape is allowed
+
+    mesh = mesh_of(case.name, surface)
+    arrays = {
+        "points": mesh.points,
+        "tetrahedra": mesh.tetrahedra,
+        "label": mesh.region_of,
+        "fixed": held_points(case.name, mesh),
+    }
+    return SimpleNamespace(name=case.name, radius=case.radius, materials=case.materials, mesh=arrays)
 
 
 def free_triangles(mesh: dict[str, np.ndarray]) -> np.ndarray:

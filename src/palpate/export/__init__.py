@@ -29,7 +29,7 @@ from palpate.export.answer_network import Choice
 from palpate.export.c_export import ExportedC, export_c
 from palpate.export.carried_mass import CarriedMass
 from palpate.export.fmu_export import ExportedFmu, export_fmu
-from palpate.export.lib_export import ExportedLibrary, export_lib
+from palpate.export.lib_export import export_lib
 from palpate.export.package_folder import ExportedPackage
 from palpate.export.unity_export import export_unity
 from palpate.export.unreal_export import export_unreal
@@ -40,7 +40,6 @@ __all__ = [
     "Choice",
     "ExportedC",
     "ExportedFmu",
-    "ExportedLibrary",
     "ExportedPackage",
     "WeightsBlock",
     "export_c",

@@ -129,7 +129,7 @@ def field_tables(surrogate: Surrogate, name: str, known: Mapping[int, Table]) ->
             f"The field {name!r} under a tool that turns, or on a curved surface, has no exported form yet.",
             why="Where it touches follows from all balls of the tool's front, which the evaluator core takes for the "
             "energy alone.",
-            fix="Take it by `palpate export c`, `lib` or `fmu`, without a field; force, torque and energy are the same.",
+            fix="Take it by `palpate export c`, `lib` or `fmu`, without a field; force, torque, energy are the same.",
         )
     going, mode = shown.continuation, shown.local_mode
     assert going is not None

@@ -31,24 +31,12 @@ __all__ = ["ExportedLibrary", "export_lib", "library_name"]
 
 @dataclass(frozen=True)
 class ExportedLibrary:
-    """Sources, wrappers and library of one body.
+    """Sources, wrappers and library of one body."""
 
-    Attributes
-    ----------
-    sources : ExportedC
-        The C files.
-    wrappers : tuple of Path
-        For Python and MATLAB.
-    library : Path, optional
-        The shared library; None where there was no compiler.
-    comparison : Comparison, optional
-        How far the library is from palpate, asked by the Python wrapper.
-    """
-
-    sources: ExportedC
-    wrappers: tuple[Path, ...]
-    library: Path | None
-    comparison: Comparison | None
+    sources: ExportedC  # the C files
+    wrappers: tuple[Path, ...]  # for Python and MATLAB
+    library: Path | None  # the shared library; None where there was no compiler
+    comparison: Comparison | None  # how far the library is from palpate, asked by the Python wrapper
 
     @property
     def files(self) -> tuple[Path, ...]:

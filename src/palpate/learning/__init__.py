@@ -21,30 +21,28 @@ learn_dataset  `palpate.learn`: a dataset made into a body that is felt and seen
 from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.bent_body import FEWEST, hand_coordinates, node_outputs
-from palpate.learning.energy import EnergyHistory, SuspectSolve, learn_energy
+from palpate.learning.energy import SuspectSolve, learn_energy
 from palpate.learning.learn import Learned, automatic, freeze, learn
 from palpate.learning.learn_dataset import LearningHistory
 from palpate.learning.learn_dataset import learn as learn_dataset
 from palpate.learning.learning_history import History
-from palpate.learning.pad_fit import fit_pad
 from palpate.learning.search import Trial
 from palpate.learning.stream.following import Following
 from palpate.learning.stream.learner import Learner
 from palpate.learning.stream.refining import Refining
 from palpate.learning.stream.reservoir import Reservoir
-from palpate.learning.structure import grow, prune, refined_network
+from palpate.learning.structure import grow, refined_network
 from palpate.options import Refinement
 from palpate.rbf.filter.observation import Observation
 from palpate.rbf.filter.settings import PRESETS, Settings, default, founding, recommended
 from palpate.rbf.filter.state import State, initial
 from palpate.rbf.filter.step import Event, observe, step
 from palpate.rbf.refinement.posterior import Posterior, posterior
-from palpate.rbf.refinement.refine import Refined, refine
+from palpate.rbf.refinement.refine import refine
 
 __all__ = [
     "FEWEST",
     "PRESETS",
-    "EnergyHistory",
     "Event",
     "Fitted",
     "Following",
@@ -54,7 +52,6 @@ __all__ = [
     "LearningHistory",
     "Observation",
     "Posterior",
-    "Refined",
     "Refinement",
     "Refining",
     "Reservoir",
@@ -65,7 +62,6 @@ __all__ = [
     "automatic",
     "default",
     "fit",
-    "fit_pad",
     "founding",
     "freeze",
     "grow",
@@ -77,7 +73,6 @@ __all__ = [
     "node_outputs",
     "observe",
     "posterior",
-    "prune",
     "recommended",
     "refine",
     "refined_network",

@@ -40,6 +40,7 @@ SEARCHED = 60  # observations from which lengths are searched: more cost time an
 # evaluations of the likelihood: for a new process, and from the last lengths
 FIRST_STEPS, FURTHER_STEPS = 60, 16
 _SPREAD = 0.4  # size of the search's first simplex, in logarithms
+_AT_ONCE = 100_000  # numbers of each array that stands for several maps: more leave the cache
 _MIXED = 1e-9  # entry of a map that mixes two inputs
 
 
@@ -72,22 +73,25 @@ def covariance(A: np.ndarray, B: np.ndarray, lengths: np.ndarray, images: Images
     """
     n, inverse = A.shape[1], 1.0 / lengths**2
     out = np.zeros((len(A), 1 + n, len(B), 1 + n))
-    own = np.arange(n)
     fixed = images.shifts.mean(axis=0)  # the middle of the origin's images
-    centred = A - fixed
-    for G, image in zip(images.turns, images.of(B), strict=True):
-        D = A[:, None] - image[None]
+    centred, placed = A - fixed, images.of(B)
+    step = max(1, _AT_ONCE // max(len(A) * len(B) * n, 1))
+    for i in range(0, len(placed), step):
+        G, image = images.turns[i : i + step], placed[i : i + step]
+        D = A[:, None] - image[:, None]
         E = D * inverse
-        q = (D * E).sum(axis=2)
-        k = 1.0 / np.sqrt(1.0 + q)
-        first, second = -0.5 * k / (1.0 + q), 0.75 * k / (1.0 + q) ** 2
-        by_a = 2.0 * first[..., None] * E
-        out[:, 0, :, 0] += k + LEVEL + SLOPE * centred @ (image - fixed).T
-        out[:, 0, :, 1:] += -by_a @ G + SLOPE * (centred @ G)[:, None]
-        out[:, 1:, :, 0] += (by_a + SLOPE * (image - fixed)[None]).transpose(0, 2, 1)
-        both = (-4.0 * second)[..., None, None] * E[..., :, None] * E[..., None, :]
-        both[..., own, own] -= 2.0 * first[..., None] * inverse
-        out[:, 1:, :, 1:] += (both @ G + SLOPE * G).transpose(0, 2, 1, 3)
+        turned = E @ G[:, None]
+        inner = 1.0 / (1.0 + (D * E).sum(axis=3))
+        k = np.sqrt(inner)
+        first = k * inner  # −2 dk/dq, by q = ‖x − G x' − t‖²/l²
+        around = image - fixed
+        out[:, 0, :, 0] += (k + LEVEL + SLOPE * centred @ around.transpose(0, 2, 1)).sum(axis=0)
+        out[:, 0, :, 1:] += np.einsum("gxp,gxpb->xpb", first, turned)
+        out[:, 0, :, 1:] += SLOPE * (centred @ G.sum(axis=0))[:, None]
+        out[:, 1:, :, 0] += SLOPE * around.sum(axis=0).T - np.einsum("gxp,gxpa->xap", first, E)
+        out[:, 1:, :, 1:] += np.einsum("gxpa,gxpb->xapb", (-3.0 * first * inner)[..., None] * E, turned)
+        out[:, 1:, :, 1:] += np.einsum("gxp,gab->xapb", first, inverse[:, None] * G)
+        out[:, 1:, :, 1:] += SLOPE * G.sum(axis=0)[:, None]
     return out / len(images.turns)
 
 

@@ -23,7 +23,8 @@ from palpate.learning.arrays.fit import fit
 from palpate.learning.arrays.fitted import Fitted
 from palpate.learning.arrays.input_bends import choose_bends
 from palpate.learning.dataset_answers import DatasetAnswers
-from palpate.learning.energy import EnergyHistory, SuspectSolve, learn_energy
+from palpate.learning.energy import SuspectSolve, learn_energy
+from palpate.learning.energy.learn_energy import EnergyHistory
 from palpate.learning.fields import LearntField, LearntModes, learn_modes
 from palpate.learning.learning_history import History
 from palpate.learning.lumps import LumpPresses, learn_lumps

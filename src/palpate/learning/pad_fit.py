@@ -52,29 +52,10 @@ def fit_pad(
     degree: Literal["auto", 0, 1, 2] = "auto",
     stiffening: Literal["auto", 0, 1, 2, 3, 4, 5] = "auto",
 ) -> tuple[PadBaseline, dict[tuple[int, int], float]]:
-    """Find the stiffness at rest and the polynomial of a body that is held by a pad.
+    """Find the stiffness at rest S and the polynomial P of a body that is held by a pad, and what they miss.
 
-    Parameters
-    ----------
-    solves : Solves
-        Displacements of the pad first (m), then its place and further inputs.
-    degree : {"auto", 0, 1, 2}
-        Degree of the stiffness at rest as a polynomial of place and further inputs; "auto" takes the one that misses
-        least of solves left out.
-    stiffening : {"auto", 0 … 5}
-        Degree of the polynomial P of all inputs.
-
-    Returns
-    -------
-    PadBaseline
-        With S and P.
-    errors : dict
-        What S and P alone miss of solves left out, by the degrees of both.
-
-    Raises
-    ------
-    UsageError
-        If there are fewer than four solves, they do not fit, or the place's axes do not.
+    `degree` is that of S by place and further inputs, `stiffening` that of P by all inputs; "auto" takes the one that
+    misses least of solves left out. The errors are what S and P alone miss of these, by the degrees of both.
     """
     n, axes = len(solves.inputs), solves.axes
     if len(set(axes)) != len(axes) or not set(axes) <= {0, 1, 2} or 3 + len(axes) > n:

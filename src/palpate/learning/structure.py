@@ -186,22 +186,6 @@ def prune(
     """Prune a network: while the leave-one-out error stays under the target, drop the unit that it misses least.
 
     Which one that is follows in closed form for all units at once; the others are refined after each removal.
-
-    Parameters
-    ----------
-    X, Y : (N, n), (N, m)
-        Scaled.
-    network : Refined
-        To begin with.
-    target : float
-        Leave-one-out error per scaled output that must be kept.
-    fit : callable
-        `refine`, with the options bound that the network was made with.
-
-    Returns
-    -------
-    Refined, tuple of Trial
-        The smallest that meets the target, or the network itself.
     """
     search, kept = Search(_Scaled(X, Y, fit)), network
     while len(kept.theta):

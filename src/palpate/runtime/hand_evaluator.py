@@ -44,7 +44,7 @@ class Model(Protocol):
 
     @property
     def start(self) -> np.ndarray:
-        """Their values (p,) with which the loop begins."""
+        """Values (p,) of `parameters` with which a loop begins."""
         ...
 
     @property

@@ -68,6 +68,7 @@ class _SpringModel:
     """The spring behind the loop's `Model`."""
 
     parameters: tuple[Range, ...] = ()
+    start = np.zeros(0)
     tool_axis = np.array([0.0, 0.0, 1.0])
 
     def evaluator(self) -> HandEvaluator:

@@ -28,6 +28,7 @@ import signal
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -270,7 +271,10 @@ def main() -> int:
     asked = _wishes(stopping)
     _import_all()
     wish = asked()
+    from palpate.physics.advice import ModelWarning
     from palpate.study.toml import read_study
+
+    warnings.simplefilter("ignore", ModelWarning)  # the page's process has read the same part, and told them
 
     try:
         file = Path(wish["study"])

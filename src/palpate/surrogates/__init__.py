@@ -46,8 +46,7 @@ from palpate.surrogates.fields import (
     NodeField,
 )
 from palpate.surrogates.learnt_quantities import LearntQuantities
-from palpate.surrogates.lumps import Lump, LumpContrast, LumpRoom
-from palpate.surrogates.moving_rest import Followed
+from palpate.surrogates.lumps import Lump, LumpContrast
 from palpate.surrogates.surface import TouchedSurface
 from palpate.surrogates.surrogate import Surrogate
 
@@ -63,12 +62,10 @@ __all__ = [
     "Field",
     "FieldEvaluator",
     "FieldSurrogate",
-    "Followed",
     "LearntEnergy",
     "LearntQuantities",
     "Lump",
     "LumpContrast",
-    "LumpRoom",
     "MeshPlaces",
     "ModalEvaluator",
     "ModalField",

@@ -54,21 +54,12 @@ class MovingRest:
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """The answer of a body along a history of places.
+    """The answer of a body along a history of places."""
 
-    Attributes
-    ----------
-    force : (N, 3)
-        On the hand, N.
-    stored, lost : (N,)
-        Energy that can be had back, and energy that can't, J.
-    rest : (3,)
-        Where the body lies once it is let go at the end, m; zero for one that goes back to rest.
-    """
-
-    force: np.ndarray
-    stored: np.ndarray
-    lost: np.ndarray
+    force: np.ndarray  # (N, 3), on the hand, N
+    stored: np.ndarray  # (N,), energy that can be had back, J
+    lost: np.ndarray  # (N,), energy that can't, J
+    # (3,), where the body lies once it is let go at the end, m; zero for one that goes back to rest
     rest: np.ndarray
 
 

@@ -293,9 +293,6 @@ def _start_scheduler() -> tuple[Any, Any]:
     import distributed
 
     security = distributed.Security.temporary()
-
-    # Dask silences its loggers while a cluster runs; a connection that closes just after would still be told
-    logging.getLogger("distributed.batched").setLevel(logging.WARNING)
     settings = {
         # one task at a time per worker: a task that kills it takes no other one along
         "distributed.scheduler.worker-saturation": 1.0,

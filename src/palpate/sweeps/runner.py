@@ -119,7 +119,8 @@ def _client(cluster: Any) -> distributed.Client:
         cluster = Scheduler(cluster)
     security = cluster.security() if isinstance(cluster, Scheduler) else getattr(cluster, "security", None)
     address = cluster.address if isinstance(cluster, Scheduler | LocalCluster) else cluster
-
+    # Dask silences its loggers while a cluster of its own runs; a worker that was killed, or just ends, would be told
+    logging.getLogger("distributed.batched").setLevel(logging.WARNING)
     try:
         return distributed.Client(address, security=security, set_as_default=False)
     except (OSError, ValueError) as error:  # a time-out is one of the first; a wrong address, of the second

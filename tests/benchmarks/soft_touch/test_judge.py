@@ -16,6 +16,7 @@ from benchmarks.soft_touch.judge import (
     compare,
     delay,
     judge,
+    main,
     monotone_cubic,
     plain_figures,
     question,
@@ -118,6 +119,17 @@ def test_presses_without_an_oracle_are_not_judged(tmp_path):
     assert compare(answers, case)["jnd_median"] == pytest.approx(3.0)
 
 
+def test_stiffness_may_be_asked_of_some_presses(case):
+    answers = question(lambda places: 1.2 * force(places), case, loops=False, probed=case.presses[3:7])
+    assert (len(answers["press"]), len(answers["deeper"])) == (20, 4)
+    assert compare(answers, case)["stiffness_median"] == pytest.approx(20.0, abs=0.02)
+
+
+def test_a_folder_without_cases_is_named(tmp_path, capsys):
+    assert main([str(tmp_path / "method.py"), "--cases", str(tmp_path)]) == 2
+    assert "holds no case" in capsys.readouterr().err
+
+
 def test_a_table_gives_no_stiffness(case, tmp_path):
     table = tmp_path / "forces.csv"
     rows = [(press, *f) for press, f in zip(case.presses, force(case.places), strict=True)]
@@ -182,7 +194,17 @@ def test_figures_in_json_are_valid_without_an_answer(case):
         ("method.py", "load = 3", "can't be loaded for the case half-space"),
         ("method.py", "def load(case): return 3", "returned int, which gives no forces"),
         ("method.py", "def load(case): return lambda places: places[0]", "an array of shape (3,)"),
+        ("method.py", "import sys\nsys.exit(3)", "SystemExit: 3"),
+        ("method.py", "def load(case): return lambda places: 1j * places", "complex numbers"),
+        (
+            "method.py",
+            "def force(places): return places\nforce.solves = 'many'\ndef load(case): return force",
+            "solves of the method is 'many', no number",
+        ),
         ("method.csv", "press,fx\n0,1\n", "has no column fy"),
+        ("method.csv", "press,fx,fy,fz\n0,1,0\n", "a row of another length"),
+        ("method.csv", "press,fx,fy,fz\n0,1,0,0\n0,2,0,0\n", "several rows for one press"),
+        ("method.csv", "press,fx,fy,fz\nnan,1,0,0\n", "a press that is no number"),
         ("method.csv", "press,fx,fy,fz\n0,a,0,0\n", "no number"),
         ("method.fmu", "no archive", "can't be read as an FMU"),
     ],

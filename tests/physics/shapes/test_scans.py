@@ -173,6 +173,18 @@ def test_two_placements_of_a_nifti_header_that_differ_are_told_in_mm_and_voxels(
     assert "6 mm (4 voxels) apart" in note
 
 
+@pytest.fixture(scope="module")
+def half_ball(tmp_path_factory):
+    """Return the mesh of half a ball of fat of 24 mm in a skin of 1.5 mm, cut by the end of the image."""
+    places = np.moveaxis(np.indices((54, 54, 30)), 0, -1) - [26.5, 26.5, -0.5]
+    away = np.linalg.norm(places, axis=-1)
+    labels = np.where(away < 22.5, 1, np.where(away < 24.0, 2, 0))
+    path = write_labels(tmp_path_factory.mktemp("skin") / "half.nrrd", labels.astype(np.uint8))
+    with pytest.warns(ModelWarning, match="one layer of flat elements"):
+        mesh = ImportedScan(path, {"fat": 1, "skin": 2}, element=5e-3).rest()
+    return mesh, {name: 1e-9 * (labels == k).sum() for name, k in (("fat", 1), ("skin", 2))}
+
+
 class TestThinLayers:
     @pytest.mark.parametrize(("layers", "element"), [(1, 1.4e-3), (2, 2.8e-3)])
     def test_a_skin_of_few_voxels_stays_whole_where_elements_are_as_small(self, layers, element):
@@ -187,6 +199,27 @@ class TestThinLayers:
         flow = np.einsum("ti,ti->t", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) / 6
         volume = flow[surface.inside == 2].sum() - flow[surface.outside == 2].sum()
         assert volume == pytest.approx(image.volumes["skin"], rel=0.005)
+
+    def test_a_skin_thinner_than_an_element_keeps_its_volume_and_covers_the_body(self, half_ball):
+        mesh, voxels = half_ball
+        assert mesh.region_volumes == pytest.approx(voxels, rel=0.03)
+        assert set(mesh.surfaces) == {"skin surface", "cut"}  # fat shows at the cut alone
+        assert mesh.areas["skin surface"] == pytest.approx(2 * np.pi * 0.024**2, rel=0.05)
+        assert mesh.areas["cut"] == pytest.approx(np.pi * 0.024**2, rel=0.15)  # its rim is round
+
+    def test_such_a_skin_is_as_high_as_its_voxels_everywhere_and_no_element_is_inside_out(self, half_ball):
+        mesh, _ = half_ball
+        corners = np.unique(mesh.triangles[mesh.surface_of == mesh.surfaces.index("skin surface")])
+        places = mesh.points[corners] - [26.5e-3, 26.5e-3, -0.5e-3]
+        away = np.linalg.norm(places[places[:, 2] > 5e-3], axis=1)  # an element from the rim of the cut
+        assert np.sqrt(((away - 0.024) ** 2).mean()) < 0.25e-3  # a quarter of a voxel
+        edges = mesh.points[mesh.tetrahedra[:, 1:]] - mesh.points[mesh.tetrahedra[:, :1]]
+        assert (np.linalg.det(edges) > 0).all()
+        # one body: each face belongs to two elements or to the surface
+        faces = np.sort(mesh.tetrahedra[:, SIDES].reshape(-1, 3), axis=1)
+        _, count = np.unique(faces, axis=0, return_counts=True)
+        assert set(count.tolist()) == {1, 2}
+        assert (count == 1).sum() == len(mesh.triangles)
 
 
 class TestRepairs:
@@ -272,12 +305,13 @@ class TestRefusals:
 
     def test_a_layer_that_the_elements_would_lose_is_refused_by_its_volume(self, tmp_path):
         labels = np.zeros((40, 40, 40), np.uint8)
-        labels[5:35, 5:35, 5:35] = 2
-        labels[6:34, 6:34, 6:34] = 1
+        labels[5:35, 5:35, 5:35] = 1
+        labels[11:29, 11:29, 11:29] = 2
+        labels[12:28, 12:28, 12:28] = 1
         path = write_labels(tmp_path / "thin.nrrd", labels)
         with pytest.raises(UsageError, match="too large for 'lump'") as error:
             ImportedScan(path, NAMES, element=6e-3).rest()
-        assert "5.05 ml in the voxels" in error.value.why
+        assert "1.74 ml in the voxels" in error.value.why
 
     def test_two_names_of_one_number_are_refused(self, scan):
         with pytest.raises(UsageError, match="share a name or a number"):

@@ -158,6 +158,17 @@ def test_parts_of_the_phantom_have_their_volumes():
     assert found["skin"] == pytest.approx(VOLUMES[PHANTOM] - inner, rel=5e-3)
 
 
+@pytest.mark.parametrize("radius", [0.004, 0.008])
+def test_curved_elements_of_an_inclusion_are_nowhere_flat(radius):
+    # det J at corners and middles of edges; beneath a hundredth of its mean a press turns the element inside out
+    mesh = Dome(0.05, 0.04, inclusion=Inclusion((0.012, 0.0, 0.02), radius)).mesh()
+    shares = [row for row in np.ndindex(3, 3, 3) if sum(row) <= 2]
+    rule = ngsolve.IntegrationRule([tuple(0.5 * x for x in row) for row in shares], [1.0] * len(shares))
+    volume = ngsolve.Det(ngsolve.specialcf.JacobianMatrix(3))
+    values = np.asarray(volume(mesh.MapToAllElements(rule, ngsolve.VOL))).reshape(-1, len(shares))
+    assert (values.min(axis=1) / values.mean(axis=1)).min() > 0.2
+
+
 def test_the_fine_rectangle_of_the_block():
     # the mesh whose force ripples by 0.04 % under a sliding probe: 6 mm in 20 mm has about 10,000 unknowns
     patch = FineMesh("top", 0.006, (0.022, 0.034, 0.0), (0.078, 0.072, 1.0))

@@ -66,7 +66,7 @@ def test_it_is_refused_with_an_offer_and_meshes_when_wrapped(tmp_path):
     path = write(tmp_path / "scan.stl", *blobs())
     with pytest.raises(UsageError, match="--wrap"):
         _ = pp.shapes.ImportedSolid(path, "mm").skin
-    shape = pp.shapes.ImportedSolid(path, "mm", element=0.02, wrap=SIZE)
+    shape = pp.shapes.ImportedSolid(path, "mm", element=0.02, wrap=2 * SIZE)
     with pytest.warns(match="was wrapped"):
         assert any("was wrapped" in note for note in shape.notes)
     assert Integrate(1.0, shape.mesh()) == pytest.approx(union_volume(), rel=0.05)

@@ -14,11 +14,10 @@ import_results  all of it made into a dataset
 from palpate.dataset.readers.formats import FORMATS, Format, read_results
 from palpate.dataset.readers.import_results import Imported, import_results
 from palpate.dataset.readers.mapping import ImportMapping, read_mapping
-from palpate.dataset.readers.results import Column, Places, Results
+from palpate.dataset.readers.results import Places, Results
 
 __all__ = [
     "FORMATS",
-    "Column",
     "Format",
     "ImportMapping",
     "Imported",

@@ -26,27 +26,15 @@ SAME_TIME = 1e-5  # relative difference that is rounding of times printed with s
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """One named quantity of all cases.
+    """One named quantity of all cases."""
 
-    Attributes
-    ----------
-    name : str
-        Name in the file; of a vector or tensor with its component, ``DISP.D1``.
-    values : (case,) or (case, place) array of float
-        Values in the file's unit; not-a-number where the file has none.
-    unit : str or None
-        Unit that the file states, "" for a pure number, None where it states nothing.
-    measure : str
-        Formula of the unit in a consistent system, such as ``"{force}/{length}**2"``; empty where it isn't known.
-    places : str
-        Name of the places among `Results.places`; empty for one number a case.
-    """
-
-    name: str
-    values: np.ndarray
-    unit: str | None = None
+    name: str  # name in the file; of a vector or tensor with its component, ``DISP.D1``
+    values: np.ndarray  # values in the file's unit; not-a-number where the file has none
+    unit: str | None = None  # unit that the file states, "" for a pure number, None where it states nothing
+    # formula of the unit in a consistent system, such as ``"{force}/{length}**2"``; empty where it isn't
+    # known
     measure: str = ""
-    places: str = ""
+    places: str = ""  # name of the places among `Results.places`; empty for one number a case
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ phantom              a specimen made by formula
 from palpate.learning.correction.correct import Correction, correct, summarise_correction
 from palpate.learning.correction.corrector import Corrector, Event
 from palpate.learning.correction.load_cell import LoadCell
-from palpate.learning.correction.measures import ForceError, force_error
+from palpate.learning.correction.measures import force_error
 from palpate.learning.correction.phantom import Phantom
 from palpate.learning.correction.probe_positions import probe_positions
 from palpate.learning.correction.specimen_posterior import SpecimenPosterior
@@ -26,7 +26,6 @@ __all__ = [
     "Corrector",
     "Discrepancy",
     "Event",
-    "ForceError",
     "LoadCell",
     "Noise",
     "Phantom",

@@ -16,25 +16,13 @@ FELT = 0.05  # of the largest force: relative errors are of touches above it
 
 @dataclass(frozen=True)
 class ForceError:
-    """Errors of N measured touches.
+    """Errors of N measured touches."""
 
-    Attributes
-    ----------
-    count : int
-        Touches in contact, by the model or by the sensor.
-    rms : float
-        Root mean square of ‖error‖, N.
-    relative : float
-        That over the root mean square of the measured force.
-    median, p95 : float
-        Of ‖error‖/‖force‖ over touches of more than a twentieth of the largest force.
-    """
-
-    count: int
-    rms: float
-    relative: float
-    median: float
-    p95: float
+    count: int  # touches in contact, by the model or by the sensor
+    rms: float  # root mean square of ‖error‖, N
+    relative: float  # that over the root mean square of the measured force
+    median: float  # median of ‖error‖/‖force‖ over touches of more than a twentieth of the largest force
+    p95: float  # 95th percentile of the same
 
     def __str__(self) -> str:
         return (

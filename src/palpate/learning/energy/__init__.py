@@ -10,7 +10,7 @@ energy_export    the parts of an energy from what was found
 learn_energy     all of it, with the choice of a baseline
 """
 
-from palpate.learning.energy.learn_energy import EnergyHistory, learn_energy
+from palpate.learning.energy.learn_energy import learn_energy
 from palpate.learning.energy.suspect_solves import SuspectSolve
 
-__all__ = ["EnergyHistory", "SuspectSolve", "learn_energy"]
+__all__ = ["SuspectSolve", "learn_energy"]

@@ -39,25 +39,13 @@ UNSURE = 0.2  # relative standard error from which on a time counts as not told
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """The relaxation that a record tells, and how surely.
+    """The relaxation that a record tells, and how surely."""
 
-    Attributes
-    ----------
-    relaxation : Relaxation
-        The branches that were found.
-    shares_error, times_error : (n,)
-        Standard errors of γ_i and of τ_i in s.
-    noise : float
-        Standard deviation of the samples about the fit, over the force at the start.
-    scores : mapping
-        Schwarz's score of each number of branches tried; the least was chosen.
-    """
-
-    relaxation: Relaxation
-    shares_error: np.ndarray
-    times_error: np.ndarray
-    noise: float
-    scores: Mapping[int, float]
+    relaxation: Relaxation  # the branches that were found
+    shares_error: np.ndarray  # (n,), standard errors of γ_i
+    times_error: np.ndarray  # (n,), standard errors of τ_i, s
+    noise: float  # standard deviation of the samples about the fit, over the force at the start
+    scores: Mapping[int, float]  # Schwarz's score of each number of branches tried; the least was chosen
 
     def __str__(self) -> str:
         rows = zip(self.relaxation.terms, self.shares_error, self.times_error, strict=True)

@@ -22,7 +22,7 @@ from palpate.physics.interactions.glued import GluedPad
 from palpate.physics.interactions.interaction import Attached, Energy, Field, Fixed, Interaction, Planned
 from palpate.physics.interactions.interaction_checks import free_motions, require_support
 from palpate.physics.interactions.loads import BodyForce, PointForce, Pressure, SurfaceTraction
-from palpate.physics.interactions.pads import PadShare, pad_share
+from palpate.physics.interactions.pads import pad_share
 from palpate.physics.interactions.pinch import Pinch
 from palpate.physics.interactions.prescribed import PrescribedDisplacement, roller
 from palpate.physics.interactions.sphere import SphereProbe
@@ -36,7 +36,6 @@ __all__ = [
     "Fixed",
     "GluedPad",
     "Interaction",
-    "PadShare",
     "Pinch",
     "Planned",
     "PointForce",

@@ -79,21 +79,12 @@ def _stiffer(probe: Any, modulus: float, depth: float) -> float:
 
 @dataclass(frozen=True)
 class PadShare:
-    """Relative change with the pad's stiffness k, at the same inputs.
+    """Relative change with the pad's stiffness k, at the same inputs."""
 
-    Attributes
-    ----------
-    energy : float
-        d ln U/d ln k: for a pad whose energy is proportional to k, the share of U that the pad stores.
-    force : float
-        d ln |F|/d ln k.
-    stiffness : float
-        d ln |∂F/∂q|/d ln k along the force: the pad's share of the compliance.
-    """
-
+    # d ln U/d ln k: for a pad whose energy is proportional to k, the share of U that the pad stores
     energy: float
-    force: float
-    stiffness: float
+    force: float  # d ln |F|/d ln k
+    stiffness: float  # d ln |∂F/∂q|/d ln k along the force: the pad's share of the compliance
 
 
 def pad_share(problem: Any, x: Any) -> PadShare:

@@ -28,7 +28,7 @@ from palpate.physics.materials.hardening import LinearHardening, VoceHardening
 from palpate.physics.materials.library import MATERIALS, named_material
 from palpate.physics.materials.linear import LinearElastic
 from palpate.physics.materials.lumped import Lumped
-from palpate.physics.materials.material import Elastic, Material, StateVariable, Volumetric
+from palpate.physics.materials.material import Elastic, Material, StateVariable
 from palpate.physics.materials.material_fit import MaterialFit
 from palpate.physics.materials.material_stability import ModeStability, Stability
 from palpate.physics.materials.mooney_rivlin import MooneyRivlin
@@ -69,7 +69,6 @@ __all__ = [
     "UserMaterial",
     "Viscoelastic",
     "VoceHardening",
-    "Volumetric",
     "Yeoh",
     "fit",
     "fit_relaxation",

@@ -68,18 +68,13 @@ def small_volume(F: Tensor) -> Scalar:
 
 @dataclass(frozen=True)
 class Volumetric:
-    """The volumetric part ½ · modulus · measure(F)² of an energy.
+    """The volumetric part ½ · modulus · measure(F)² of an energy."""
 
-    Attributes
-    ----------
-    modulus : float
-        Modulus in Pa, positive; infinite for an incompressible material, which only a mixed formulation can solve.
-    measure : callable
-        Function from F to a pure number that vanishes at F = I with slope 1 in the volume: `log_volume`,
-        `volume_change`, `small_volume`, or another module-level function.
-    """
-
+    # modulus in Pa, positive; infinite for an incompressible material, which only a mixed formulation can
+    # solve
     modulus: float
+    # function from F to a pure number that vanishes at F = I with slope 1 in the volume: `log_volume`,
+    # `volume_change`, `small_volume`, or another module-level function
     measure: Callable[[Tensor], Scalar]
 
     def energy(self, F: Tensor) -> Scalar:

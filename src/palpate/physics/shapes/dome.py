@@ -13,6 +13,10 @@ from palpate.physics.shapes.shape import Isometry, Solid, mirror_isometries, rou
 
 __all__ = ["Dome", "Inclusion"]
 
+# Element over an inclusion's radius. Larger ones, Netgen's own half a radius among them, can have all corners on the
+# ball near its pole: once curved they are flat there, and a press of 2 mm turns them inside out.
+LARGEST = 0.35
+
 
 @dataclass(frozen=True)
 class Inclusion:
@@ -133,7 +137,7 @@ class Dome(Solid):
             ball = Sphere(Pnt(*self.inclusion.centre), self.inclusion.radius)
             ball.mat("inclusion")
             ball.faces.name = INTERFACE
-            ball.solids.maxh = min(self.coarse, 0.7 * self.inclusion.radius)  # else a ball of few edges
+            ball.solids.maxh = min(self.coarse, LARGEST * self.inclusion.radius)
             parts[-1] = parts[-1] - ball
             parts[-1].mat("body")
             parts.append(ball)

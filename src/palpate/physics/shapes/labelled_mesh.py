@@ -28,6 +28,7 @@ from palpate.physics.shapes.mesh import BodyMesh, outer_faces, tetrahedron_volum
 from palpate.physics.shapes.mesh_file import refine_mesh
 from palpate.physics.shapes.meshing import GRADING, THREADS, FineMesh, require_budget
 from palpate.physics.shapes.naming import require_name
+from palpate.physics.shapes.outer_layer import ThinLayer, add_layer, thin_layer, without_layer
 from palpate.physics.shapes.packed_file import require_file
 from palpate.physics.shapes.scan_file import LabelImage, clear_specks, name_labels, read_scan
 from palpate.physics.shapes.shape import Shape, require_size
@@ -73,8 +74,9 @@ class ImportedScan(Shape):
         Names of the numbers that belong to the body; what else the file holds is left out. By default all numbers but
         0, by the names that the file states or as ``label 1``, ``label 2``, ….
     element : float, optional
-        Size in m of elements at the surfaces of tissues, by default such that 2,000 cubes of it fill the body. A layer
-        that is thinner is lost in part, and told.
+        Size in m of elements at the surfaces of tissues, by default such that 2,000 cubes of it fill the body. An
+        outermost tissue that is thinner, such as skin, becomes one layer of flat elements; another is lost in part,
+        and told.
     up : {"superior", "inferior", "anterior", "posterior", "left", "right"}
         Direction of the patient that becomes z. "superior" keeps the coordinates of the file; for a breast or belly of
         a patient who lies on the back it is "anterior".
@@ -199,11 +201,15 @@ def _mesh_scan(
     volume = sum(image.volumes.values())
     spacing = element or float(f"{(volume / CUBES) ** (1 / 3):.2g}")
     require_budget([(volume, spacing)], [])
-    surface = label_surface(turned, spacing)
-    points, tetrahedra, region = _fill(path, surface, spacing)
+    layer = thin_layer(turned, spacing)
+    surface = label_surface(without_layer(turned, layer) if layer else turned, spacing)
+    solid = _fill(path, surface, spacing)
+    if layer:
+        ends = _on_cut(turned, surface.points[surface.triangles], spacing)
+        surface, solid = add_layer(turned, layer, surface, solid, ends)
     # the numbers of regions that the mesh has are those of the labels, from 1
-    mesh = _body(turned, surface, points, tetrahedra, region, spacing)
-    return mesh, (*image.notes, *_notes(path, image, surface, mesh, spacing))
+    mesh = _body(turned, surface, *solid, spacing)
+    return mesh, (*image.notes, *_notes(path, image, surface, mesh, spacing, layer))
 
 
 def turn_upwards(image: LabelImage, up: str) -> LabelImage:
@@ -268,7 +274,9 @@ def _body(
     behind = np.array([key.get(tuple(row), 0) for row in np.sort(outer, axis=1).tolist()])
     names = list(image.names)
     present = [k for k in range(len(names)) if (region == k).any()]
-    index = np.where(_on_cut(image, points[outer], spacing), len(names), behind - 1)
+    # sides of a thin layer are of no tissue's surface: it ends at the cut
+    is_cut = _on_cut(image, points[outer], spacing) | (behind == 0)
+    index = np.where(is_cut, len(names), behind - 1)
     every = [*(f"{name} surface" for name in names), CUT_FACE]
     used, surface_of = np.unique(index, return_inverse=True)
     return BodyMesh(
@@ -294,7 +302,14 @@ def _on_cut(image: LabelImage, corners: np.ndarray, spacing: float) -> np.ndarra
     return np.asarray((first | last).any(axis=1))
 
 
-def _notes(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, spacing: float) -> list[str]:
+def _notes(
+    path: str,
+    image: LabelImage,
+    surface: LabelSurface,
+    mesh: BodyMesh,
+    spacing: float,
+    layer: ThinLayer | None,
+) -> list[str]:
     """Return sentences about what became of each tissue; refuse a mesh that has lost one."""
     told = []
     if CUT_FACE in mesh.surfaces:
@@ -313,7 +328,12 @@ def _notes(path: str, image: LabelImage, surface: LabelSurface, mesh: BodyMesh, 
                 why=f"It is too thin: {said}.",
                 fix=f"Choose smaller ones, such as {finer}, or leave the label out.",
             )
-        if thick < spacing or abs(there - wanted) > TELLS * wanted:
+        if layer and name == layer.name:
+            told.append(
+                f"{name} is about {millimetres(thick)} thick, and elements {millimetres(spacing)}: it is one layer of "
+                f"flat elements over the rest, {said}."
+            )
+        elif thick < spacing or abs(there - wanted) > TELLS * wanted:
             told.append(
                 f"{name} is about {millimetres(thick)} thick, and elements {millimetres(spacing)}: {said}, but "
                 "layers thinner than an element come out ragged. "

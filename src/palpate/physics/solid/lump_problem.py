@@ -20,8 +20,7 @@ from palpate.errors import UsageError
 from palpate.physics.interactions.sphere import SphereProbe
 from palpate.physics.shapes.meshing import INSIDE, FineMesh
 from palpate.physics.solid.lump_solver import LumpSolver
-from palpate.surrogates.lumps import LumpRoom
-from palpate.surrogates.lumps.lump_room import skin_of
+from palpate.surrogates.lumps.lump_room import LumpRoom, skin_of
 from palpate.units import Range
 
 if TYPE_CHECKING:

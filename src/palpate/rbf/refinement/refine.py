@@ -39,50 +39,28 @@ _MOST_LEVERAGE = 0.98  # a sample that decides its own fit says little; its resi
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """A refined network in scaled quantities.
+    """A refined network in scaled quantities."""
 
-    Attributes
-    ----------
-    regressors : Regressors
-        Kind of units and tail.
-    theta : (h, p)
-        Its units.
-    coefficients : (p_t + h, m)
-        The tail's, then the units' weights.
-    rms : float
-        Weighted root mean square training error per scaled output, of values only.
-    loo : float
-        Leave-one-sample-out error per scaled output: the root of Σ of the weighted squared errors of all that is
-        known of a sample, its value, slopes and curvatures, when the sample (or its group) is left out, over Σ w.
-        In closed form for weights and tail (Allen 1974), with the units' own numbers counted as leverage in the
-        linearised problem. Infinite where there are as many unknowns as known numbers: what can fit anything says
-        nothing of samples it has not seen.
-    condition : float
-        2-norm condition number of the regressors; large values mean that units nearly cancel.
-    iterations : int
-        Accepted steps that were taken.
-    converged : bool
-        Whether the last steps brought no more gain; False means that a limit came first.
-    without : (h,)
-        The leave-one-out error were one unit removed and the others left as they are, for each unit, with the
-        units' degrees of freedom spread over all rows alike; it ranks them even where `loo` is infinite.
-    heldout : float
-        Root mean square error per scaled output on the held-out samples; not-a-number without them.
-    rows : int
-        Numbers known of each output: N values, and the slopes and curvatures that counted too.
-    """
-
-    regressors: Regressors
-    theta: np.ndarray
-    coefficients: np.ndarray
-    rms: float
+    regressors: Regressors  # kind of units and tail
+    theta: np.ndarray  # (h, p), its units
+    coefficients: np.ndarray  # (p_t + h, m), the tail's, then the units' weights
+    rms: float  # weighted root mean square training error per scaled output, of values only
+    # leave-one-sample-out error per scaled output: the root of Σ of the weighted squared errors of all that
+    # is known of a sample, its value, slopes and curvatures, when the sample (or its group) is left out,
+    # over Σ w. In closed form for weights and tail (Allen 1974), with the units' own numbers counted as
+    # leverage in the linearised problem. Infinite where there are as many unknowns as known numbers: what
+    # can fit anything says nothing of samples it has not seen
     loo: float
-    condition: float
-    iterations: int
-    converged: bool
+    condition: float  # 2-norm condition number of the regressors; large values mean that units nearly cancel
+    iterations: int  # accepted steps that were taken
+    converged: bool  # whether the last steps brought no more gain; False means that a limit came first
+    # (h,), the leave-one-out error were one unit removed and the others left as they are, for each unit,
+    # with the units' degrees of freedom spread over all rows alike; it ranks them even where `loo` is
+    # infinite
     without: np.ndarray
+    # root mean square error per scaled output on the held-out samples; not-a-number without them
     heldout: float = float("nan")
-    rows: int = 0
+    rows: int = 0  # numbers known of each output: N values, and the slopes and curvatures that counted too
 
     @property
     def tail(self) -> np.ndarray:

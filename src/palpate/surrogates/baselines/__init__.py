@@ -11,7 +11,6 @@ constant_baseline   a constant, for several loads whose place of rest moves
 from palpate.surrogates.baselines.baseline import (
     Baseline,
     Solves,
-    baseline_class,
     register_baseline,
     registered_baselines,
 )
@@ -37,7 +36,6 @@ __all__ = [
     "Solves",
     "Stiffening",
     "ToolBaseline",
-    "baseline_class",
     "deepest_ball",
     "depth_series",
     "register_baseline",

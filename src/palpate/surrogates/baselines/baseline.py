@@ -299,13 +299,7 @@ def register_baseline(cls: type[Baseline]) -> type[Baseline]:
 
 
 def baseline_class(name: str) -> type[Baseline]:
-    """Return the baseline of a name.
-
-    Raises
-    ------
-    UsageError
-        If none is registered.
-    """
+    """Return the baseline of a name."""
     if name not in _CLASSES:
         raise UsageError(
             f"There is no baseline {name!r}.",

@@ -17,7 +17,7 @@
 from palpate.surrogates.fields.depth_amplitude import DepthAmplitude
 from palpate.surrogates.fields.field import Field, line_of, modal_fields, surface_fields
 from palpate.surrogates.fields.field_evaluator import FieldEvaluator
-from palpate.surrogates.fields.field_surrogate import FieldErrors, FieldSurrogate
+from palpate.surrogates.fields.field_surrogate import FieldSurrogate
 from palpate.surrogates.fields.local_mode import LocalMode, Variation
 from palpate.surrogates.fields.modal_field import ModalEvaluator, ModalField
 from palpate.surrogates.fields.node_field import NodeEvaluator, NodeField
@@ -27,7 +27,6 @@ __all__ = [
     "AxisPlaces",
     "DepthAmplitude",
     "Field",
-    "FieldErrors",
     "FieldEvaluator",
     "FieldSurrogate",
     "LocalMode",

@@ -51,27 +51,13 @@ def sizes_of(errors: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class FieldErrors:
-    """Errors of N solves at each node, as sizes in the field's unit.
+    """Errors of N solves at each node, as sizes in the field's unit."""
 
-    Attributes
-    ----------
-    truncation : (N, nodes)
-        Of the nearest field that the modes and the moving part can show.
-    learning : (N, nodes)
-        Between that and the field that is answered.
-    total : (N, nodes)
-        Of the field that is answered.
-    mass : (nodes,)
-        Shares of the surface.
-    unit : str
-        SI unit of the field.
-    """
-
-    truncation: np.ndarray
-    learning: np.ndarray
-    total: np.ndarray
-    mass: np.ndarray
-    unit: str
+    truncation: np.ndarray  # (N, nodes), of the nearest field that the modes and the moving part can show
+    learning: np.ndarray  # (N, nodes), between that and the field that is answered
+    total: np.ndarray  # (N, nodes), of the field that is answered
+    mass: np.ndarray  # (nodes,), shares of the surface
+    unit: str  # SI unit of the field
 
     def rms(self, what: str = "total") -> np.ndarray:
         """Root mean square over the surface (N,); total² = truncation² + learning²."""

@@ -11,6 +11,5 @@
 
 from palpate.surrogates.lumps.lump import Lump
 from palpate.surrogates.lumps.lump_contrast import LumpContrast
-from palpate.surrogates.lumps.lump_room import LumpRoom
 
-__all__ = ["Lump", "LumpContrast", "LumpRoom"]
+__all__ = ["Lump", "LumpContrast"]

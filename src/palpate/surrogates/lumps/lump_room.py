@@ -19,33 +19,15 @@ SLACK = 1e-9  # of a range or a length: a number at its end is inside
 
 @dataclass(frozen=True, eq=False)
 class LumpRoom:
-    """The room in a body where lumps were looked up, and their sizes.
+    """The room in a body where lumps were looked up, and their sizes."""
 
-    Attributes
-    ----------
-    lower, upper : (3,)
-        Corners in m of the box of a lump's centre.
-    radius : Range
-        Of radii, m.
-    ratio : Range
-        Of ratios of moduli.
-    cover : float
-        Least tissue in m between a lump's edge and any surface of the body.
-    skin : (T, 7)
-        Triangles of the body's surface: middle (m), outward unit normal, and the distance of the farthest corner from
-        the middle (m). Without any, the box alone decides.
-
-    Raises
-    ------
-    UsageError
-        If the box is empty, or radius or ratio is not positive.
-    """
-
-    lower: np.ndarray
-    upper: np.ndarray
-    radius: Range
-    ratio: Range
-    cover: float = 0.0
+    lower: np.ndarray  # (3,), least corner in m of the box of a lump's centre
+    upper: np.ndarray  # (3,), largest corner in m of the box of a lump's centre
+    radius: Range  # of radii, m
+    ratio: Range  # of ratios of moduli
+    cover: float = 0.0  # least tissue in m between a lump's edge and any surface of the body
+    # (T, 7), triangles of the body's surface: middle (m), outward unit normal, and the distance of the
+    # farthest corner from the middle (m). Without any, the box alone decides
     skin: np.ndarray = field(default_factory=lambda: np.zeros((0, 7)))
 
     def __post_init__(self) -> None:
@@ -81,13 +63,7 @@ class LumpRoom:
         return np.asarray(self.clearances(places) >= (EDGE * radii + self.cover) * (1 - SLACK))
 
     def require(self, lump: Lump) -> None:
-        """Refuse a lump that lies outside, has another size, or leaves the skin.
-
-        Raises
-        ------
-        UsageError
-            If it does.
-        """
+        """Refuse a lump that lies outside, has another size, or leaves the skin."""
         place, spans = np.array(lump.place), self.upper - self.lower
         if (place < self.lower - SLACK * spans).any() or (place > self.upper + SLACK * spans).any():
             low, high = (millimetres(*corner) for corner in (self.lower, self.upper))
@@ -109,13 +85,7 @@ class LumpRoom:
         self.require_cover(lump)
 
     def require_cover(self, lump: Lump) -> None:
-        """Refuse a lump whose edge, and the tissue about it, reach beyond the skin.
-
-        Raises
-        ------
-        UsageError
-            If they do.
-        """
+        """Refuse a lump whose edge, and the tissue about it, reach beyond the skin."""
         if not self.hold(np.array([lump.place]), np.array([lump.radius]))[0]:
             clear, least = self.clearances(np.array([lump.place]))[0], EDGE * lump.radius + self.cover
             raise UsageError(

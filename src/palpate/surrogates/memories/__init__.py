@@ -10,7 +10,7 @@ patches         places of the touched surface
 
 from palpate.surrogates.memories.friction import Friction, FrictionState
 from palpate.surrogates.memories.indentation import Indentation, IndentationState
-from palpate.surrogates.memories.iwan_elements import IwanElements, IwanMemento, IwanState
+from palpate.surrogates.memories.iwan_elements import IwanElements, IwanState
 from palpate.surrogates.memories.memory import (
     Amplitude,
     Carry,
@@ -31,7 +31,6 @@ __all__ = [
     "Indentation",
     "IndentationState",
     "IwanElements",
-    "IwanMemento",
     "IwanState",
     "Memory",
     "MemoryState",

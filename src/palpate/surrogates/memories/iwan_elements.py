@@ -297,22 +297,12 @@ class IwanElements(Memory):
 
 @dataclass(frozen=True, eq=False)
 class IwanMemento:
-    """All that the future of a held body depends on, and its energies so far.
+    """All that the future of a held body depends on, and its energies so far."""
 
-    Attributes
-    ----------
-    amplitude : float
-        q, √J.
-    elongation, slipped : (n,)
-        e_i and α_i, √J.
-    ledger : (4,)
-        Stored, lost, work of the hand, and lost in the last step, J.
-    """
-
-    amplitude: float
-    elongation: np.ndarray
-    slipped: np.ndarray
-    ledger: np.ndarray
+    amplitude: float  # q, √J
+    elongation: np.ndarray  # (n,), e_i, √J
+    slipped: np.ndarray  # (n,), α_i, √J
+    ledger: np.ndarray  # (4,), stored, lost, work of the hand, and lost in the last step, J
 
 
 class IwanState(MemoryState):

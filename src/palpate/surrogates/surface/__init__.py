@@ -13,7 +13,7 @@
 """
 
 from palpate.surrogates.surface.ball_overlap import Overlap
-from palpate.surrogates.surface.distance_kernels import distance_into, distances_into
+from palpate.surrogates.surface.distance_kernels import distance_into
 from palpate.surrogates.surface.touched_surface import TouchedSurface
 
-__all__ = ["Overlap", "TouchedSurface", "distance_into", "distances_into"]
+__all__ = ["Overlap", "TouchedSurface", "distance_into"]

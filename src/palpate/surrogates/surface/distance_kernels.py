@@ -182,16 +182,6 @@ def distances_into(
     coefficients: np.ndarray,
     profile: np.ndarray,
 ) -> None:
-    """Fill signed distances and their derivatives at many positions.
-
-    Parameters
-    ----------
-    places : (N, 3)
-        The positions, m.
-    distances, gradients, hessians : (N,), (N, 3), (N, 3, 3)
-        Filled with d in m, ∇d and ∇²d in 1/m.
-    frame, coefficients, profile : arrays
-        The surface, from `TouchedSurface.compiled`.
-    """
+    """Fill signed distances and their derivatives at many positions."""
     for n in range(places.shape[0]):
         distances[n] = distance_into(places[n], gradients[n], hessians[n], frame, coefficients, profile)

@@ -26,6 +26,7 @@ from palpate.runtime.swap import swap_between
 from palpate.runtime.touchable import touchable
 from palpate.surrogates import Surrogate
 from palpate.surrogates.memories import Indentation, IwanElements, Patches, Relaxation
+from surrogates.touch_made import overlap_baseline, touch_energy
 
 LIMITS = Limits(12.0)
 RELAXES = Relaxation(((0.4, 0.1), (0.2, 0.5)))
@@ -118,6 +119,23 @@ def test_the_force_goes_from_one_to_the_other_without_a_jump(seconds):
     np.testing.assert_array_equal(touch.wanted[-1], alone.wanted[-1])
     assert touch.loop.out.record["swaps"] == 1
     assert not touch.loop.out.record["blending"]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_ball_s_other_form_takes_the_place_of_the_first(order):
+    """Of few solves learning may choose a depth, of more of them an overlap: either goes on in the other's hand."""
+    surface = overlap_baseline().touched
+    forms = [Surrogate(touch_energy(surface=surface)), Surrogate(touch_energy(baseline=overlap_baseline()))]
+    old, new = forms[::order]
+    touch = Touch(old)
+    touch.press(0.002)
+    touch.tick(100)
+    touch.swap(new)
+    touch.until_swapped()
+    touch.tick(1)
+    place = touch.loop.out.position[None]
+    assert touch.wanted[-1] == pytest.approx(touchable(new).energy.force(place)[0], rel=1e-6)
+    assert np.linalg.norm(touch.wanted[-1]) > 0.0
 
 
 def test_what_blending_adds_is_the_difference_of_the_energies_and_is_booked():

@@ -38,6 +38,7 @@ __all__ = ["SECONDS", "SHORTEST", "Swap", "require_blend_time", "require_same_bo
 SECONDS, SHORTEST = 0.2, 0.1  # s that a blend takes by default, and at least
 _UNFELT = 1e-3  # W that blending may always add: a slow hand's device takes more by its own damping
 _SAME = 1e-9  # of a probe's radius, and of a direction
+_FORMS = {"overlap": "contact"}  # of one ball on one body: learning takes the one that misses less
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +212,7 @@ def _traits(body: Touchable) -> dict[str, str]:
     return {
         "the body is": "held" if body.holds else "pressed",
         "the inputs are": ", ".join(f"{r.name} ({r.unit})" if r.unit else r.name for r in body.inputs),
-        "the baseline is": body.energy.baseline.name,
+        "the baseline is": _FORMS.get(body.energy.baseline.name, body.energy.baseline.name),
         "the radius of the probe is": "fixed" if body.radius_parameter is None else "an input",
         "the memory is": "none" if body.memory is None else body.memory.name,
         "the loads that draw it are": "none"

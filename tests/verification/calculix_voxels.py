@@ -39,7 +39,7 @@ def deck(
     nodes, index = np.unique(rows.reshape(-1, 3), axis=0, return_inverse=True)
     index = index.reshape(-1, 8) + 1
     points = size * (nodes - [0, 0, labels.shape[2] / 2]) - [0, 0, top / calculix.MILLI]
-    lines = ["*NODE, NSET=ALL", *_numbered(points)]
+    lines = ["*NODE, NSET=ALL", *_number_rows(points)]
     for label, law in laws.items():
         lines.append(f"*ELEMENT, TYPE=C3D8I, ELSET=R{label}")
         mine = np.flatnonzero(part[tuple(places.T)] == label)
@@ -66,5 +66,5 @@ def deck(
     return "\n".join([*lines, *calculix_ball.steps(depths)]) + "\n"
 
 
-def _numbered(points: np.ndarray) -> list[str]:
+def _number_rows(points: np.ndarray) -> list[str]:
     return [f"{n}, {x:.10g}, {y:.10g}, {z:.10g}" for n, (x, y, z) in enumerate(points.tolist(), 1)]

@@ -166,7 +166,9 @@ def _step_of(solution: Any) -> ShownStep:
     fields = {VON_MISES: "von_mises", STRETCH: "largest_stretch"}
     known = {name: getattr(solution, attribute, None) for name, attribute in fields.items()}
     tool, pose = getattr(solution, "tool", None), getattr(solution, "pose", None)
-    placed = {"ball": ball_of(solution, True)} if tool is None or pose is None else _placed(tool, pose)
+    placed = (
+        {"ball": ball_of(solution, True)} if tool is None or pose is None else _tool_placement(tool, pose)
+    )
     return ShownStep(
         displacement=solution.displacement,
         values={name: values for name, values in known.items() if values is not None},
@@ -177,7 +179,7 @@ def _step_of(solution: Any) -> ShownStep:
     )
 
 
-def _placed(tool: PosedTool | Gripper, pose: np.ndarray) -> dict[str, Any]:
+def _tool_placement(tool: PosedTool | Gripper, pose: np.ndarray) -> dict[str, Any]:
     """Return where a tool with inputs (3 + k,) is, as a `ShownStep` takes it."""
     ball = (pose[:3], tool.shape.size)
     if isinstance(tool, Gripper):
@@ -261,7 +263,7 @@ def _sample(data: Any, row: int, radius: float | None, tool: PosedTool | Gripper
     count = 4 if isinstance(tool, Gripper) else 3 + (0 if tool is None else len(tool.angles))
     placed: dict[str, Any] = {"ball": None}
     if inputs.shape == (count,) and tool is not None:
-        placed = _placed(tool, inputs)
+        placed = _tool_placement(tool, inputs)
     elif inputs.shape == (count,) and radius is not None:
         placed = {"ball": (inputs, radius)}
     response = sample["response"].values if "response" in sample else None
